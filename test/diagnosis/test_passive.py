@@ -12,6 +12,7 @@ from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.sufficiency import without_motors
 from sgp_ros.diagnosis.compare.trajectory import collect
+from sgp_ros.diagnosis.criteria import PER_EFFECT, PER_UNUSUAL
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.engine.samples import frozen_array
 from sgp_ros.errors import RecordingError
@@ -121,6 +122,27 @@ def test_of_two_joints_the_one_without_efforts_is_named(robots):
     ]
     with pytest.raises(RecordingError, match=r'has an effort of joint1, .* passive: \[joint1\]'):
         diagnose(events, *robots[2], {})
+
+
+def test_no_law_is_unusual_where_no_joint_has_a_motor(passive, robots):
+    """Drag in the air is not rarer there than friction in a bearing."""
+    prices = []
+    for robot, tree in (passive, robots[1]):
+        raw = collect(events_of(_swing(), commands=tree.is_actuated.any()), robot)
+        equations = make_equations(raw, tree, choose_bandwidth(raw, tree))
+        prices.append(fitted(equations, 'quadratic_drag').law_price)
+    assert prices == [PER_EFFECT, PER_EFFECT + PER_UNUSUAL]
+
+
+@pytest.mark.parametrize(('noise', 'is_certain'), [(1e-4, True), (0.02, False)])
+def test_noise_hides_what_a_free_swing_loses(light, noise, is_certain):
+    """It is not certain then that it loses nothing."""
+    world = simulate(UNDAMPED, 1, 25.0, motor=lambda _commands, _t: (0.0,))
+    seen = world.position + noise * np.random.default_rng(0).standard_normal(world.position.shape)
+    found = diagnose(events_of(replace(world, position=seen), commands=False), *light, {})
+    assert found.verdict == 'no_mismatch'
+    assert (found.certainty is not None) == is_certain
+    assert any('a third of its energy would not show' in x for x in found.remarks) != is_certain
 
 
 def test_bodies_without_a_motor_do_not_vanish(passive):

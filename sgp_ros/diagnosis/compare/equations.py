@@ -289,7 +289,7 @@ def make_equations(
     noise = noise_beside_laws(measured_noise(raw, motion, bandwidth), d, bases, motion, low)
     loop = Loop.of(motion, bandwidth.cutoff)
     carried = loop.volume(carried_inertia(motion, low, inertial, d))
-    power, error = reference_power(motion, inertial)
+    power, error = reference_power(motion, inertial, variance)
     error += np.exp(2.0 * carried) * smoothing_error(raw, motion, low, bandwidth)
     equations = Equations(
         motion, low, motion.time[low.rows], d, bases, directions, power, np.sqrt(variance),

@@ -1,4 +1,4 @@
-"""What forces are compared with: mean squared efforts, or in a free swing the bodies' inertia.
+"""Powers that forces are compared with: those of efforts, or of what a free swing would lose.
 
 Where no joint has a motor, the motion is that of bodies, springs and friction of any common scale:
 forces are told for the inertia that the robot file states.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sgp_ros.diagnosis.criteria import COUNTED_SHARE, FLOOR_SHARE, LOST_ENERGY
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE, FLOOR_SHARE, LEAST_SHARE, LOST_ENERGY
 from sgp_ros.rigid.rigid_body import torque_regressor
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.observed_motion import ObservedMotion
@@ -18,37 +18,43 @@ _HELD = 0.01
 """Part of the prior standard deviation of its inertia that is left to a robot without motors."""
 
 
-def reference_power(motion: ObservedMotion, inertial: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def reference_power(
+    motion: ObservedMotion, inertial: np.ndarray, noise: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the mean squares that shares refer to, and errors of signals beyond those of shares.
 
     That is the mean squared efforts; at joints without a motor, inertial forces of their own
     acceleration. Where no joint has a motor nothing is lost but to friction, and it adds up over
     the way `s`: one of level F counts from `F s = LOST_ENERGY max(m v^2 / 2)`, however small it is
-    beside the weight. Errors of the signals are still relative to the inertial forces.
+    beside the weight, if it counts beside the noise of the encoders. Errors of the signals are
+    still relative to the inertial forces.
 
     Args:
         motion: that was seen, n rows.
         inertial: (N, k) low-passed inertial forces of each joint's own acceleration [N m or N].
+        noise: (k,) mean squares of what the encoders' noise makes of these.
 
     Returns:
         Powers, 1 where nothing moves, and errors, (k,) each [N^2 m^2 or N^2].
     """
     driven = motion.tree.is_actuated[: motion.tree.size]
     own = (inertial**2).mean(axis=0)
-    counted = own
+    counted, error = own, np.zeros(len(own))
     if not driven.any():
-        v = motion.velocity
-        energy = (0.5 * motion.mass_diagonal * v**2).max(axis=0)
-        way = motion.step * np.abs(v).sum(axis=0) / _recordings(motion)
-        level = LOST_ENERGY * energy / np.maximum(way, 1e-300)
-        counted = np.minimum(own, level**2 / COUNTED_SHARE)
+        level = LOST_ENERGY / np.maximum(loss(motion, np.sign(motion.velocity)), 1e-300)
+        counted = np.minimum(own, np.maximum(level**2 / COUNTED_SHARE, noise / LEAST_SHARE))
+        error = FLOOR_SHARE * (own - counted) + noise
     power = np.where(driven, (motion.effort**2).mean(axis=0), counted)
     power = np.where(motion.moves & (power > 0.0), power, 1.0)
-    return power, FLOOR_SHARE * (own - counted)
+    return power, error
 
 
-def _recordings(motion: ObservedMotion) -> int:
-    return 1 if motion.recording is None else len(np.unique(motion.recording))
+def loss(motion: ObservedMotion, force: np.ndarray) -> np.ndarray:
+    """Return the work of forces (n, k) in a recording, by the greatest kinetic energy, (k,)."""
+    work = motion.step * np.abs((force * motion.velocity).sum(axis=0))
+    recordings = 1 if motion.recording is None else len(np.unique(motion.recording))
+    energy = (0.5 * motion.mass_diagonal * motion.velocity**2).max(axis=0)
+    return np.asarray(work / recordings / np.maximum(energy, 1e-300))
 
 
 def at_one_scale(directions: np.ndarray, motion: ObservedMotion) -> np.ndarray:

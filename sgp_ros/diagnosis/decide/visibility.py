@@ -17,8 +17,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations, joint_name
+from sgp_ros.diagnosis.compare.power import loss
 from sgp_ros.diagnosis.compare.settled import shows as may_show
-from sgp_ros.diagnosis.criteria import COUNTED_SHARE, MOST_UNSEEN, PER_EFFECT, PER_PARAMETER
+from sgp_ros.diagnosis.criteria import (
+    COUNTED_SHARE,
+    MOST_UNSEEN,
+    NEARLY,
+    PER_EFFECT,
+    PER_PARAMETER,
+)
 from sgp_ros.diagnosis.decide.decision import Decision
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import split
@@ -36,7 +43,7 @@ _FINEST = 1e-3
 """Least size that is tried, relative to the least start of a search."""
 _HALVINGS = 10
 _HIDDEN = (
-    'Friction of {} that makes a tenth of the mean squared effort would not show here, so it is '
+    'Friction of {} that makes {} would not show here, so it is '
     'not certain that nothing is missing: record for longer, at more speeds, or with less noise.'
 )
 _SAME = 1e-3
@@ -77,6 +84,8 @@ def hides_friction(
 ) -> tuple[str, ...]:
     """Say where friction of a tenth of the mean squared effort would not show.
 
+    Of a robot without motors, friction that takes a third of its energy.
+
     Args:
         equations: of the recording.
         comparison: its models.
@@ -84,16 +93,21 @@ def hides_friction(
     """
     scale, motion = Scale.of(equations, comparison), equations.motion
     beside = _Beside(Columns(equations), scale, decision.model)
+    is_driven = bool(motion.tree.is_actuated.any())
     found: dict[str, None] = {}
     for j, power in enumerate(scale.power):
         for effect in (COULOMB_FRICTION, VISCOUS_FRICTION):
             unit = EffectAt(effect, Place(j), coefficients=np.ones(1))
-            mean = float((unit.columns(motion) ** 2).mean())
-            if mean > 0.0 and may_show(effect, unit.place, motion):
-                size = math.sqrt(MOST_UNSEEN * float(power) / mean)
-                if beside.clearness(replace(unit, coefficients=np.array([size]))) < 1.0:
-                    found[joint_name(motion, j)] = None
-    return (_HIDDEN.format(', '.join(found)),) if found else ()
+            force = unit.columns(motion)
+            if not (force.any() and may_show(effect, unit.place, motion)):
+                continue
+            size = math.sqrt(MOST_UNSEEN * float(power / (force**2).mean()))
+            if not is_driven:
+                size = NEARLY / float(loss(motion, force)[j])
+            if beside.clearness(replace(unit, coefficients=np.array([size]))) < 1.0:
+                found[joint_name(motion, j)] = None
+    part = 'a tenth of the mean squared effort' if is_driven else 'it lose a third of its energy'
+    return (_HIDDEN.format(', '.join(found), part),) if found else ()
 
 
 def _sought() -> Iterator[tuple[Effect, Quantity]]:

@@ -105,12 +105,12 @@ class Model:
 
     @property
     def law_price(self) -> float:
-        """Price of the laws, higher where few joints have them [nats].
+        """Price of the laws, higher where few joints with a motor have them [nats].
 
-        Laws with a prior on their numbers have paid by that, and further waves of one law with the
-        first.
+        Laws with a prior on their numbers have paid by that, further waves with the first.
         """
-        unusual = sum(
+        is_driven = self.frame.equations.motion.tree.is_actuated.any()
+        unusual = is_driven * sum(
             type(e).surprise is Effect.surprise and not (e.is_open or adds_to_usual(e))
             for e in (s.effect for s in self.effects if not s.is_further_wave)
         )
