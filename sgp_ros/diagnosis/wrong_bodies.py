@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import NUMBER_ERROR
+from sgp_ros.diagnosis.criteria import ALIKE, NUMBER_ERROR, PER_PARAMETER
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.result import ParameterError
 
@@ -18,6 +19,8 @@ def parameter_errors(
 ) -> tuple[ParameterError, ...]:  # fmt: skip
     """Return masses and centres that differ by more than two standard deviations.
 
+    Those of one body, with all others as stated, where one alone explains what all of them do.
+
     Args:
         equations: of the recording.
         model: that was asserted.
@@ -27,8 +30,10 @@ def parameter_errors(
     tree = equations.motion.tree
     if not model.is_free:
         return ()
-    C, stated = _of_bodies(model), tree.parameters
-    changed = equations.with_bodies(equations.motion, model.w).tree.parameters
+    (w, C), stated = _changed(model), tree.parameters
+    if other is not None:
+        w, C = model.w, _of_bodies(model)
+    changed = equations.with_bodies(equations.motion, w).tree.parameters
     if other is not None:
         C = C + _of_bodies(other)
         stated = equations.with_bodies(equations.motion, other.w).tree.parameters
@@ -53,6 +58,33 @@ def parameter_errors(
             if abs(now - then) > 2.0 * std and abs(now - then) > 1e-9:
                 found.append(ParameterError(link, name, float(now), std, float(then), unit))
     return tuple(found)
+
+
+def _changed(model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Return the change of the bodies, (p,), and its covariance, (p, p); of one if that will do.
+
+    The others cost `|R (w - x)|^2 / (2 weight)` [nats] if they stay as stated. That must be less
+    than the price of the numbers they determine, and of no other body nearly as little.
+    """
+    frame, equations = model.frame, model.frame.equations
+    at = equations.instants
+    owned = np.asarray(equations.directions.reshape(len(frame.R) - at, -1, 10).any(axis=2))
+    found = []
+    for body in range(owned.shape[1] if (owned.sum(axis=1) <= 1).all() else 0):
+        kept = np.flatnonzero(np.concatenate([np.ones(at, dtype=bool), owned[:, body]]))
+        some = replace(frame, R=np.asarray(np.linalg.qr(frame.R[:, kept], mode='r')))
+        x = np.linalg.lstsq(frame.R[:, kept], frame.R @ model.w, rcond=None)[0]
+        lost = frame.R @ model.w - frame.R[:, kept] @ x
+        found.append((0.5 * float(lost @ lost) / frame.weight, body, kept, x, some))
+    found.sort(key=lambda item: item[0])
+    if len(found) < 2 or found[1][0] < found[0][0] + ALIKE:
+        return model.w, _of_bodies(model)
+    cost, _, kept, x, some = found[0]
+    if cost > PER_PARAMETER * (frame.determined - some.determined):
+        return model.w, _of_bodies(model)
+    w, C = np.zeros_like(model.w), np.zeros_like(frame.R)
+    w[kept], C[np.ix_(kept, kept)] = x, some.covariance
+    return w, C[at:, at:]
 
 
 def _of_bodies(model: Model) -> np.ndarray:

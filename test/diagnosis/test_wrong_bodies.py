@@ -1,0 +1,39 @@
+"""Wrong bodies are told by their masses and centres, one body by itself where that will do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from sgp_ros.diagnosis.wrong_bodies import parameter_errors
+from test.diagnosis.fitted_models import fitted
+from test.diagnosis.worlds import CHAINS, simulate
+
+
+@pytest.mark.parametrize(('link', 'mass', 'centre'), [(1, 1.2, 1.0), (1, 1.0, 1.2)])
+def test_one_wrong_body_is_told_with_its_numbers(equations_for, link, mass, centre):
+    """Masses of a chain trade with each other's centres: alone they are known."""
+    chain = list(CHAINS[2])
+    stated = chain[link]
+    chain[link] = replace(stated, mass=mass * stated.mass, centre=centre * stated.centre)
+    _, equations = equations_for(simulate(tuple(chain), 5))
+    name = equations.motion.tree.link_names[link]
+    found = parameter_errors(equations, fitted(equations, is_free=True))
+    assert {e.link for e in found} == {name}
+    by_name = {e.parameter: e for e in found}
+    wanted = {'mass': chain[link].mass, 'com_z': -chain[link].centre}
+    for parameter, error in by_name.items():
+        assert abs(error.value - wanted[parameter]) < 4.0 * error.std
+        assert error.value == pytest.approx(wanted[parameter], rel=0.02)
+    assert ('mass' if mass > 1.0 else 'com_z') in by_name
+
+
+def test_two_wrong_bodies_are_not_told_as_one(equations_for):
+    """Of a chain whose first link is longer in its centre, and whose second is lighter."""
+    first, second = CHAINS[2]
+    chain = (replace(first, inertia=2.0 * first.inertia), replace(second, mass=0.7 * second.mass))
+    _, equations = equations_for(simulate(chain, 5))
+    model = fitted(equations, is_free=True)
+    alone = [e for e in parameter_errors(equations, model) if e.std < 1e-3 * abs(e.value)]
+    assert not alone
