@@ -37,12 +37,15 @@ def learned_processes(equations: Equations, decision: Decision) -> tuple[Remaind
 def kept_processes(final: FinalModel) -> tuple[tuple[Remainder, ...], tuple[str, ...]]:
     """Return the processes of a final model that do no harm to roll-outs, and remarks.
 
-    One after the other joins those that were kept. Cost: one roll-out of the recording each.
+    One after the other joins those that were kept. Physics that a constant effort beats is no
+    yardstick: what explains such a joint is kept. Cost: one roll-out of the recording each.
     """
     if not final.remainders or final.equations.motion.is_static:  # no motion to roll out
         return (), ()
     names = final.equations.motion.tree.joint_names
     windows, part = _windows(final)
+    effort = final.equations.filter(final.equations.motion.effort)
+    is_empty = final.model.mean_square > effort.var(axis=0)
     kept: tuple[Remainder, ...] = ()
     remarks: tuple[str, ...] = ()
     before = left_out_errors(final, windows, part, kept)
@@ -50,7 +53,7 @@ def kept_processes(final: FinalModel) -> tuple[tuple[Remainder, ...], tuple[str,
         after = left_out_errors(final, windows, part, (*kept, remainder))
         ended = np.isfinite(before)
         ratio = after[ended].sum() / max(before[ended].sum(), 1e-300)
-        if ratio <= 1.0:
+        if ratio <= 1.0 or is_empty[remainder.joint]:
             kept, before = (*kept, remainder), after
             continue
         said = (

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -46,6 +48,16 @@ def test_a_process_that_harms_roll_outs_is_dropped_with_a_word(equations):
     assert kept == ()
     assert 'Z of joint0 was dropped' in remark
     assert kept_processes(FinalModel(*[None] * 3, ())) == ((), ())
+
+
+def test_physics_that_a_constant_beats_is_no_yardstick(equations):
+    """The same process stays where physics leaves more of the effort than varies of it."""
+    final = _final(equations, -equations.d)
+    far = replace(
+        final.model, residual=100.0 * equations.motion.effort.std() + final.model.residual
+    )
+    kept, remarks = kept_processes(replace(final, model=far))
+    assert (kept, remarks) == (final.remainders, ())
 
 
 def test_a_process_without_rows_does_not_know_them(equations):
