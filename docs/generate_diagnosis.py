@@ -30,6 +30,7 @@ LISTED, UNLISTED = 'one effect of the list', 'unlisted effect'
 MACHINES = ROOT / 'sgp_proof/results/concealed_c.json'
 PAPER = ROOT / 'sgp_proof/results/concealed_paper.json'
 CANCELLING = ROOT / 'sgp_proof/results/cancelling.json'
+SWINGS = ROOT / 'sgp_proof/results/swings.json'
 TEMPLATE = Path(__file__).parent / 'templates' / 'diagnosis.txt'
 
 
@@ -296,11 +297,36 @@ def _cancelling(report):
     return '\n'.join(lines)
 
 
+def _swings(report):
+    """Return what is said of free swings, by what takes their energy, and wrong names."""
+    lines = [
+        '| hidden | worlds | right | a wrong name | "nothing is missing", with a certainty |',
+        '|---|---|---|---|---|',
+    ]
+    for kind in dict.fromkeys(w['kind'] for w in report['worlds']):
+        some = [w for w in report['worlds'] if w['kind'] == kind]
+        counts = [sum(w[f'is_{what}'] for w in some) for what in ('right', 'wrong', 'denied')]
+        lines.append(
+            f'| {kind.replace("_", " ")} | {" | ".join(map(str, [len(some), *counts]))} |'
+        )
+    bad = [w for w in report['worlds'] if w['is_wrong'] or w['is_denied']]
+    lines += ['\nWorlds that are named wrongly, or said to lack nothing:\n'] if bad else []
+    for w in bad:
+        named = ', '.join(f'{n} of {joint} ({p:.2f})' for n, joint, _, p in w['named'])
+        lost = ', '.join(f'{x:.2f}' for x in w['lost'])
+        lines.append(
+            f'* world {w["seed"]}, {w["kind"]}, {w["joints"]} links, energy lost {lost}: '
+            f'{named or w["verdict"]}'
+        )
+    return '\n'.join(lines).replace('_', ' ')
+
+
 def text():
     """Return the page."""
     reports = [json.loads(path.read_text(encoding='utf-8')) for path in RESULTS.values()]
     nulls = [w for path in NULLS for w in json.loads(path.read_text(encoding='utf-8'))['worlds']]
     cancelling = json.loads(CANCELLING.read_text(encoding='utf-8'))
+    swings = json.loads(SWINGS.read_text(encoding='utf-8'))
     parts = {
         'tiers': ''.join(map(_tier, reports)),
         'machines': _machines(json.loads(MACHINES.read_text(encoding='utf-8'))),
@@ -309,6 +335,8 @@ def text():
         'effects': '\n'.join(_effects(nulls)),
         'cancelling': _cancelling(cancelling),
         'cancelling_seeds': '{}:{}'.format(*cancelling['seeds']),
+        'swings': _swings(swings),
+        'swings_seeds': '{}:{}'.format(*swings['seeds']),
     }
     page = TEMPLATE.read_text(encoding='utf-8')
     for name, part in parts.items():

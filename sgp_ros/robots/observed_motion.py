@@ -167,6 +167,11 @@ class ObservedMotion:
         return found
 
     @property
+    def is_swing(self) -> bool:
+        """Whether one joint moves, of a robot without motors: its energy is its own."""
+        return not self.tree.is_actuated.any() and int(self.moves.sum()) == 1
+
+    @property
     def dry_joints(self) -> frozenset[int]:
         """Indices of the joints that the nominal robot's dry friction may hold."""
         return frozenset(j for x in self.known for j in x.held_joints)

@@ -24,7 +24,7 @@ def reference_power(
     """Return the mean squares that shares refer to, and errors of signals beyond those of shares.
 
     That is the mean squared efforts; at joints without a motor, inertial forces of their own
-    acceleration. Where no joint has a motor nothing is lost but to friction, and it adds up over
+    acceleration. A single joint that swings loses nothing but to friction, and it adds up over
     the way `s`: one of level F counts from `F s = LOST_ENERGY max(m v^2 / 2)`, however small it is
     beside the weight, if it counts beside the noise of the encoders. Errors of the signals are
     still relative to the inertial forces.
@@ -40,7 +40,7 @@ def reference_power(
     driven = motion.tree.is_actuated[: motion.tree.size]
     own = (inertial**2).mean(axis=0)
     counted, error = own, np.zeros(len(own))
-    if not driven.any():
+    if motion.is_swing:
         level = LOST_ENERGY / np.maximum(loss(motion, np.sign(motion.velocity)), 1e-300)
         counted = np.minimum(own, np.maximum(level**2 / COUNTED_SHARE, noise / LEAST_SHARE))
         error = FLOOR_SHARE * (own - counted) + noise

@@ -109,11 +109,11 @@ class Model:
 
         Laws with a prior on their numbers have paid by that, further waves with the first.
         """
-        is_driven = self.frame.equations.motion.tree.is_actuated.any()
-        unusual = is_driven * sum(
+        unusual = sum(
             type(e).surprise is Effect.surprise and not (e.is_open or adds_to_usual(e))
             for e in (s.effect for s in self.effects if not s.is_further_wave)
         )
+        unusual *= not self.frame.equations.motion.is_swing
         return PER_EFFECT * self.laws + PER_UNUSUAL * unusual
 
     @property
