@@ -1,4 +1,4 @@
-"""What is said of robots without motors that swing until they rest.
+"""Free swings: names of what robots without motors lose until they rest.
 
     python -m sgp_proof.concealed.swings --seeds 0:60
 
