@@ -16,6 +16,7 @@ from sgp_ros.diagnosis.criteria import PER_EFFECT, PER_UNUSUAL
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.engine.samples import frozen_array
 from sgp_ros.errors import RecordingError
+from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.recordings.imports import import_table
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.registry import load_robot
@@ -122,6 +123,27 @@ def test_of_two_joints_the_one_without_efforts_is_named(robots):
     ]
     with pytest.raises(RecordingError, match=r'has an effort of joint1, .* passive: \[joint1\]'):
         diagnose(events, *robots[2], {})
+
+
+def test_laws_of_motors_and_of_the_clock_have_no_place_in_a_free_swing(passive, robots):
+    """Without a motor there is no rotor; as a swing decays its size tells the time."""
+    for (robot, tree), count in ((passive, 0), (robots[1], 1)):
+        raw = collect(events_of(_swing(), commands=bool(count)), robot)
+        motion = make_equations(raw, tree, choose_bandwidth(raw, tree)).motion
+        assert len(EFFECTS['armature'].places(motion)) == count
+        assert bool(EFFECTS['friction_drift'].places(motion)) == bool(count)
+
+
+def test_bodies_of_a_free_swing_keep_the_inertia_of_the_file(light):
+    """No motion tells a common scale; the place of the centre it tells."""
+    robot, tree = light
+    link = replace(UNDAMPED[0], centre=1.1 * UNDAMPED[0].centre)
+    world = simulate((link,), 1, 8.0, motor=lambda _commands, _t: (0.0,))
+    raw = collect(events_of(world, commands=False), robot)
+    equations = make_equations(raw, tree, choose_bandwidth(raw, tree))
+    model = fitted(equations, 'viscous_friction', is_free=True)
+    assert abs(model.inertia[0]) < 0.005
+    assert model.mean_square[0] < 0.01 * fitted(equations, is_free=False).mean_square[0]
 
 
 def test_no_law_is_unusual_where_no_joint_has_a_motor(passive, robots):
