@@ -110,7 +110,6 @@ class Unknowns:
         bodies = -(Y.reshape(len(Y) * k, -1) @ directions.T).reshape(len(Y), k, -1)
         size = np.maximum(np.sqrt((v * v).mean(axis=0)), 1e-12)
         a = motion.acceleration * (moving * has_rotors)
-        a = np.where(_sprung(motion), motion.position * moving, a)
         a = a / np.maximum(np.sqrt((a * a).mean(axis=0)), 1e-12)
         pace = np.sqrt((motion.acceleration**2).mean(axis=0))
         parts = [v / size, motion.direction * moving, 1.0 * moving, a]
@@ -155,10 +154,3 @@ class Unknowns:
         if len(b) > p:
             found += (self.friction * (b[p:].reshape(k, EVERYDAY) * size[:, None])).sum(axis=2)
         return found
-
-
-def _sprung(motion: ObservedMotion) -> np.ndarray:
-    """Return which joints have a spring and no motor, (k,): there is a spring of another size."""
-    k = motion.tree.size
-    stiff = [motion.stated_number('stiffness', j) != 0.0 for j in range(k)]
-    return np.array(stiff) & ~motion.tree.is_actuated[:k]
