@@ -30,13 +30,12 @@ def parameter_errors(
     tree = equations.motion.tree
     if not model.is_free:
         return ()
-    (w, C), stated = _changed(model), tree.parameters
-    if other is not None:
-        w, C = model.w, _of_bodies(model)
-    changed = equations.with_bodies(equations.motion, w).tree.parameters
-    if other is not None:
-        C = C + _of_bodies(other)
+    if other is None:
+        (w, C), stated = _changed(model), tree.parameters
+    else:
+        w, C = model.w, _of_bodies(model) + _of_bodies(other)
         stated = equations.with_bodies(equations.motion, other.w).tree.parameters
+    changed = equations.with_bodies(equations.motion, w).tree.parameters
     D = equations.directions.reshape(len(C), -1, 10)
     found = []
     for body, link in enumerate(tree.link_names):
