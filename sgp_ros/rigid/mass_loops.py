@@ -34,7 +34,9 @@ def fill_mass(g: Geometry, q: np.ndarray, parameters: np.ndarray, M: np.ndarray)
     for t in range(3):
         world[b, t, t] = 1.0
     for sample in range(len(q)):
-        composite[:b], composite[b] = parameters, 0.0
+        for i in range(b + 1):
+            for c in range(10):
+                composite[i, c] = parameters[i, c] if i < b else 0.0
         for i in g.order:
             _place(g, q[sample, i], i, turn, place)
             _stand(g, i, turn, place, world, origin, axis)

@@ -49,7 +49,8 @@ def _at_rest(b: int, gravity: np.ndarray) -> Moving:
         np.zeros((b + 1, 3, 3)), np.zeros((b + 1, 3)), np.zeros((b + 1, 3)),
         np.zeros((b + 1, 3)), np.zeros((b + 1, 3)),
     )  # fmt: skip
-    moving.push[b] = -gravity
+    for t in range(3):
+        moving.push[b, t] = -gravity[t]
     return moving
 
 
