@@ -10,14 +10,12 @@ Source: Spong 1987.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from sgp_ros.physics.drawing import Drawn, Scene, UnsuitableError
 from sgp_ros.physics.effect import Effect, Numbers
-from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.hidden_states import behind, derivatives, on_spring, resonator, smooth
 from sgp_ros.physics.memory import BARE, BEYOND
 from sgp_ros.physics.motion import SeenMotion, Structure
@@ -36,8 +34,6 @@ _MOST_OF_LINK = 0.95
 _LEAST_OF_LINK = 0.005
 _LEAST_STIFFNESS = 0.1
 """Of spring and gravity together, relative to the spring alone."""
-_MOST_OF_MOTOR = 0.5
-"""Of the inertia in the robot file, from which on a rotor beside it is the motor."""
 _SOFTEST_HZ = 1.0
 """Frequency of the link on its spring below which no joint is a joint."""
 _SOFT, _MOST_BESIDE = 0.9, 20.0
@@ -46,7 +42,8 @@ _SETTLING = 0.2
 """Longest ratio of damping to stiffness, relative to the period of the softest spring."""
 
 
-def _some(motion: SeenMotion) -> slice:
+def some_poses(motion: SeenMotion) -> slice:
+    """Return the rows, some hundreds at most, in whose poses an inertia is looked at."""
     return slice(None, None, max(1, len(motion.time) // _POSES))
 
 
@@ -106,37 +103,6 @@ def _of_softness(motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndar
     return np.asarray(force[:, :, None])
 
 
-def has_rotor(place: Place, effects: Sequence[EffectAt]) -> bool:
-    """Return whether the motor of a spring is in the nominal robot, or among these effects."""
-    return place.kind != BARE or Place(place.joint) in {s.place for s in effects
-                                                        if s.effect.is_inertial}  # fmt: skip
-
-
-def is_bare(joint: int, effects: Sequence[EffectAt], motion: SeenMotion) -> bool:
-    """Return whether effects add most of a motor to a joint, whose file then has none."""
-    added = sum(float(s.coefficients[0]) for s in effects
-                if s.effect.is_inertial and s.place == Place(joint))  # fmt: skip
-    return added > _MOST_OF_MOTOR * motion.free_inertia(joint, _some(motion))
-
-
-def tied(effects: Sequence[EffectAt]) -> list[tuple[int, int]]:
-    """Return the indices of springs and of the rotors beside them: their J is one number."""
-    rotors = {s.place: i for i, s in enumerate(effects) if s.effect.is_inertial}
-    return [
-        (i, rotors[own]) for i, s in enumerate(effects)
-        if isinstance(s.effect, JointElasticity) and s.place.kind == BARE
-        and (own := Place(s.place.joint)) in rotors and effects[rotors[own]].coefficients[0] > 0.0
-    ]  # fmt: skip
-
-
-def with_rotors(effects: Sequence[EffectAt]) -> tuple[EffectAt, ...]:
-    """Return effects with one J, that of the rotor, where it is beside its spring."""
-    found = list(effects)
-    for i, rotor in tied(effects):
-        found[i] = found[i].with_shape(np.array([*found[rotor].coefficients, *found[i].shape[1:]]))
-    return tuple(found)
-
-
 def _word(kind: str) -> str:
     """Return where the encoder is."""
     return 'motor' if kind == BARE else kind
@@ -157,7 +123,7 @@ class JointElasticity(Effect):
     `tau = u - J theta''`, and the nominal efforts, but for those of the motor, are those of
     another position; to first order in the twist. Shape is (J, 1/K, D/K), and with the encoder on
     the motor the part of the friction that is there. `BARE` is for robot files without rotors: the
-    inertia of the link is then all that the nominal robot has; see `with_rotors`.
+    inertia of the link is then all that the nominal robot has; see `motor_beside`.
     """
 
     name = 'joint_elasticity'
@@ -235,7 +201,7 @@ class JointElasticity(Effect):
         """
         j, (J, compliance, settling) = at.place.joint, at.shape[:3]
         beside = J - _inside(at.place, at.shape)
-        M = motion.free_inertia(j, _some(motion)) + beside
+        M = motion.free_inertia(j, some_poses(motion)) + beside
         a = compliance * J * (M - J) / M
         c = a
         if is_on_motor(at.place):
@@ -250,7 +216,7 @@ class JointElasticity(Effect):
 
         None where nothing is known of the inertia.
         """
-        if motion.free_inertia(place.joint, _some(motion)) <= 0.0:
+        if motion.free_inertia(place.joint, some_poses(motion)) <= 0.0:
             return np.zeros((0, 4 if is_on_motor(place) else 3))
         (least, stiff, *_), (most, _, slowest, *_) = self.bounds(motion, place)
         share = [0.0] if is_on_motor(place) else []
@@ -260,7 +226,7 @@ class JointElasticity(Effect):
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
         """Return a little motor, a rigid joint, no damping; and a little link on a soft spring."""
         j = place.joint
-        free = motion.free_inertia(j, _some(motion))
+        free = motion.free_inertia(j, some_poses(motion))
         rate = 2.0 * math.pi * _SOFTEST_HZ
         softest = 1.0 / (float(motion.mass_diagonal[:, j].mean()) * rate**2)
         low, high = (

@@ -145,6 +145,10 @@ def test_a_rotor_that_the_robot_file_lacks_is_told_from_the_link():
     assert float(model.mean_square[ELBOW] / (found.d[:, ELBOW] ** 2).mean()) < 0.01
     of_rotor, of_spring = reported_std(model, columns)
     assert of_spring['motor_inertia'] == pytest.approx(of_rotor['inertia'])  # one number
+    inside = EffectAt(LAW, Place(ELBOW, 'motor'), np.array([0.1 * link, *spring.shape[1:]]))
+    moved_out = fit(columns, (beside, inside), start, is_free=False)
+    assert moved_out.effects[1].place.kind == BARE
+    assert screen(columns, moved_out, [LAW], [ELBOW]) == []  # a joint has one spring
 
 
 @pytest.mark.parametrize('entry', [1, 2])

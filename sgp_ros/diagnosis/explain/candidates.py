@@ -21,7 +21,7 @@ from sgp_ros.diagnosis.explain.regression import Columns, dry_joints
 from sgp_ros.diagnosis.explain.shape_search import Bench, searched
 from sgp_ros.physics.catalogue import TORQUE_GAIN
 from sgp_ros.physics.effect_at import EffectAt, in_series
-from sgp_ros.physics.elasticity import with_rotors
+from sgp_ros.physics.motor_beside import beside_rotors, with_rotors
 from sgp_ros.physics.servo import Servo
 
 _SMALL = 1e-3
@@ -71,7 +71,9 @@ def fit(
     assert model is not None
     bench = Bench(frame, columns, w)
     model = _solved(bench, columns, candidates, w)
-    one = with_rotors(model.effects)
+    one = with_rotors(beside_rotors(model.effects, equations.motion))
+    if any(s.place != o.place for s, o in zip(one, model.effects, strict=True)):
+        return fit(columns, one, model.sigma, is_free=is_free, w=w, rounds=2, steps=steps)
     return model if one == model.effects else _solved(bench, columns, one, w)
 
 

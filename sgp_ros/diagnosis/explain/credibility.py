@@ -20,7 +20,7 @@ from sgp_ros.diagnosis.criteria import (
 from sgp_ros.diagnosis.explain.fitted_model import Model, add_force, beyond_plain
 from sgp_ros.diagnosis.explain.screening import WIDEST, are_apart
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.elasticity import has_rotor
+from sgp_ros.physics.motor_beside import has_rotor
 from sgp_ros.physics.parts import MOTOR
 from sgp_ros.robots.observed_motion import ObservedMotion
 

@@ -13,8 +13,9 @@ from sgp_ros.diagnosis.explain.products import Products, Rest
 from sgp_ros.diagnosis.explain.regression import Columns, Seen, dry_joints
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt, in_series
-from sgp_ros.physics.elasticity import has_rotor, is_bare, is_on_motor
+from sgp_ros.physics.elasticity import is_on_motor
 from sgp_ros.physics.memory import BARE
+from sgp_ros.physics.motor_beside import has_rotor, is_bare
 from sgp_ros.physics.parts import Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 
@@ -88,7 +89,9 @@ def _free_places(effect: Effect, model: Model, motion: ObservedMotion) -> Iterat
     is_of_motor = any(p.kind == BARE for p in places)
     for place in places:
         is_stated = is_of_motor and is_on_motor(place) and place.kind != BARE
-        if is_stated and is_bare(place.joint, model.effects, motion):
+        has_one = any(s.effect is effect and s.place.joint == place.joint for s in model.effects)
+        is_one = is_stated and is_bare(place.joint, model.effects, motion)
+        if is_one or (is_of_motor and has_one):
             continue
         here = [s.place.number for s in model.effects if _is_like(s, effect, place)]
         if not here:

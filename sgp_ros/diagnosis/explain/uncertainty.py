@@ -22,7 +22,7 @@ from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.regression import Columns, shape_bounds, shape_scales, with_shapes
 from sgp_ros.diagnosis.explain.shape_search import UNSEEN
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.elasticity import tied
+from sgp_ros.physics.motor_beside import tied
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 
