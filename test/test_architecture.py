@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -130,10 +131,12 @@ def _imports(tree):
             yield node.module, node
 
 
+@cache
 def _tree(path):
     return ast.parse(path.read_text(encoding='utf-8'))
 
 
+@cache
 def _texts(path):
     """Return the strings of a module that are no docstrings."""
     tree = _tree(path)
