@@ -80,25 +80,29 @@ def test_a_ripple_is_seen_over_whole_waves(equations_for, perfect, periods, show
     assert shows_waves(ripple, equations) == shown
 
 
+@pytest.fixture(scope='module')
+def long_swing(equations_for):
+    """Equations of one link over a minute."""
+    return equations_for(simulate(CHAINS[1], 1, 60.0))[1]
+
+
 @pytest.mark.parametrize(('periods', 'shown'), [(80.0, True), (300.0, False)])
 def test_a_short_ripple_is_seen_where_a_joint_turns_back_in_many_places(
-    equations_for, periods, shown
+    long_swing, periods, shown
 ):
     """Sixty waves in parts, all parts of it alike, are more than it could follow by chance."""
-    equations = equations_for(simulate(CHAINS[1], 1, 60.0))[1]
     ripple = EffectAt(EFFECTS['cogging'], Place(0), np.array([periods]))
-    assert shows_waves(ripple, equations) == shown
+    assert shows_waves(ripple, long_swing) == shown
 
 
 @pytest.mark.parametrize(('drift', 'shown'), [(0.02, True), (0.0, False)])
 def test_a_ripple_is_not_seen_where_a_joint_turns_back_in_the_same_places(
-    equations_for, drift, shown
+    long_swing, drift, shown
 ):
     """However often: it is one number for each place."""
-    equations = equations_for(simulate(CHAINS[1], 1, 60.0))[1]
-    motion = equations.motion
+    motion = long_swing.motion
     time = motion.time[:, None]
     position = 0.5 * np.sin(2.0 * np.pi * time) + drift * time
-    swinging = replace(equations, motion=replace(motion, position=position))
+    swinging = replace(long_swing, motion=replace(motion, position=position))
     ripple = EffectAt(EFFECTS['cogging'], Place(0), np.array([4.0 * np.pi * 6.0]))
     assert shows_waves(ripple, swinging) == shown
