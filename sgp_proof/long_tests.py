@@ -1,13 +1,15 @@
 """Tests that take long: run all of them and keep what came out.
 
-    python -m sgp_proof.long_tests [--out FILE]
+    python -m sgp_proof.long_tests [TEST ...] [--out FILE]
 
 Marked `long` in `test/`, and left out of `make test`, which has to end within minutes. The status
-is 1 if one fails.
+is 1 if one fails. Of tests that are given, as to pytest, the results take the place of earlier
+ones.
 """
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 import tempfile
@@ -24,15 +26,30 @@ OUTCOMES = ('failure', 'error', 'skipped')
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the tests, write their results and return the status."""
-    out = make_parser(__doc__, 'long_tests').parse_args(argv).out.resolve()
+    parser = make_parser(__doc__, 'long_tests')
+    parser.add_argument('tests', nargs='*', metavar='TEST', help='file or test; all by default')
+    options = parser.parse_args(argv)
+    out = options.out.resolve()
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / 'report.xml'
         words = ['-m', 'long', '-n', 'auto', '--max-worker-restart', '0', '--dist', 'loadfile']
         status = subprocess.run(
-            [sys.executable, '-m', 'pytest', *words, f'--junitxml={report}'], cwd=ROOT, check=False
-        ).returncode
-        write_result(out, {'tests': outcomes(report)}, 'pytest')
+            [sys.executable, '-m', 'pytest', *words, f'--junitxml={report}', *options.tests],
+            cwd=ROOT, check=False,
+        ).returncode  # fmt: skip
+        found = outcomes(report)
+    if options.tests and out.is_file():
+        found = merged(json.loads(out.read_text(encoding='utf-8'))['tests'], found)
+    write_result(out, {'tests': found}, 'pytest')
     return int(status != 0)
+
+
+def merged(
+    earlier: Sequence[dict[str, Any]], found: Sequence[dict[str, Any]]
+) -> list[dict[str, Any]]:
+    """Return all results, the later one of each test, by file and name."""
+    by_name = {(t['file'], t['test']): t for t in (*earlier, *found)}
+    return [by_name[key] for key in sorted(by_name)]
 
 
 def outcomes(report: Path) -> list[dict[str, Any]]:
