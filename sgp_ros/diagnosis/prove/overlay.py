@@ -34,7 +34,7 @@ from sgp_ros.robots.gains import Gains
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 _HORIZONS_S = {'open_0.5': 0.5, 'open_2': 2.0}
-_LONGEST_S = 10.0
+_LONGEST_S = 5.0
 """Of a replay, which is integrated step by step; less of a stiff one, or one that remembers."""
 _KEPT_S = 60.0
 _FAR = 10.0
