@@ -201,7 +201,11 @@ def test_the_tables_name_every_effect():
     assert set(EFFECT_VALUES) == set(CATALOGUE) == set(LAWS)
 
 
-@pytest.mark.parametrize('name', APPLICABLE)
+@pytest.mark.parametrize(
+    'name',
+    [pytest.param(x, marks=pytest.mark.long) if x in {'turned', 'double_pendulum'} else x
+     for x in APPLICABLE],
+)  # fmt: skip
 def test_every_stated_effect_is_simulated_as_its_robot_models_it(tmp_path, name):
     """`M a + h = tau + tau_x` with the numbers of the robot from the same file.
 

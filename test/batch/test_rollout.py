@@ -202,6 +202,7 @@ def test_reversing_under_friction_loses_no_velocity_to_the_step():
         np.testing.assert_allclose(end(dt), stop - rest**2 / 2.0, rtol=1e-12)
 
 
+@pytest.mark.long
 def test_stiction_agrees_with_ever_steeper_smooth_friction():
     """Forces of `sign(v)` are the limit of those of `tanh(v / width)`."""
 

@@ -94,7 +94,7 @@ def light(tmp_path_factory):
     ('level', 'c', 'longer', 'named'),
     [
         (0.0, 0.0, 1.0, []),
-        (0.004, 0.0, 1.0, ['coulomb_friction']),
+        pytest.param(0.004, 0.0, 1.0, ['coulomb_friction'], marks=pytest.mark.long),
         (0.004, 0.012, 1.01, ['coulomb_friction', 'quadratic_drag']),
     ],
 )  # fmt: skip

@@ -56,7 +56,11 @@ def diagnosed(robots):
     return make
 
 
-@pytest.mark.parametrize('name', PLANTED)
+@pytest.mark.parametrize(
+    'name',
+    [pytest.param(x, marks=pytest.mark.long) if x in {'viscous_friction', 'cogging'} else x
+     for x in PLANTED],
+)  # fmt: skip
 def test_planted_physics_is_named_with_its_numbers(diagnosed, name):
     """Joint, effect and parameters within 2 %, and nothing beside them."""
     expected = PLANTED[name][2]

@@ -74,9 +74,8 @@ def test_a_law_that_the_simulation_is_not_known_to_have_has_no_place_there():
 
 
 @pytest.mark.skipif(not CASES.is_dir(), reason='shared recordings are elsewhere')
-@pytest.mark.parametrize(
-    'case', ['case_05', *(pytest.param(c, marks=pytest.mark.long) for c in ('case_06', 'case_07'))]
-)
+@pytest.mark.long
+@pytest.mark.parametrize('case', ['case_05', 'case_06', 'case_07'])
 def test_the_machine_is_compared_with_its_simulation(case, tmp_path, capsys):
     folder = CASES / case
     words = ['diagnose', str(folder / 'real.mcap'), '--sim', str(folder / 'sim.mcap'), '--robot',

@@ -178,6 +178,7 @@ def test_memory_is_calibrated_on_long_streams():
     assert abs(np.mean(squares) - 1.0) < 4 * 0.058
 
 
+@pytest.mark.long
 def test_w_is_calibrated_on_long_streams_that_return():
     """Whitened errors of W have root mean square 1, though the buffer forgets every place.
 

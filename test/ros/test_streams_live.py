@@ -137,7 +137,9 @@ def test_lost_messages_are_counted(graph: Graph) -> None:
     )
 
 
-@pytest.mark.parametrize('reliability', ['BEST_EFFORT', 'RELIABLE'])
+@pytest.mark.parametrize(
+    'reliability', ['BEST_EFFORT', pytest.param('RELIABLE', marks=pytest.mark.long)]
+)
 def test_a_publisher_that_is_restarted_is_heard_again(graph: Graph, reliability: str) -> None:
     graph.start('sgp_node', **MEASURED)
     quality = QoSProfile(depth=100, reliability=ReliabilityPolicy[reliability])

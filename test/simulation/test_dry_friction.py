@@ -80,6 +80,7 @@ def test_wheel_held_by_its_bearing_turns_with_the_pole():
     assert np.ptp(stored) < 1e-8
 
 
+@pytest.mark.long
 def test_swing_under_dry_friction_loses_its_level_times_the_way():
     """Energy falls by level * |angle travelled|, through every turning point, then it rests."""
     physical = {'pole_viscosity': 0.0, 'wheel_viscosity': 0.0, 'back_emf_constant': 0.0}

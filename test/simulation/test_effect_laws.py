@@ -191,6 +191,7 @@ def test_motor_with_backlash_is_alone_inside_the_gap():
     np.testing.assert_allclose(motor[free], recording.command[free, ELBOW], atol=1e-6)
 
 
+@pytest.mark.long
 def test_link_behind_backlash_keeps_the_rest_of_the_inertia():
     """Without a gap motor and link together are the nominal robot."""
     stiff = run('backlash:joint=elbow,gap=0,motor_inertia=0.003,contact_hz=200')

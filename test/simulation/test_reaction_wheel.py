@@ -115,7 +115,8 @@ def test_added_viscosity_equals_changed_viscosity():
     assert w4['nominal'] + w4['physical'] + w4['effects'] == pytest.approx(w4['value'])
 
 
-@pytest.mark.parametrize('seed', [0, *(pytest.param(s, marks=pytest.mark.long) for s in (1, 2))])
+@pytest.mark.long
+@pytest.mark.parametrize('seed', range(3))
 def test_balance_keeps_the_pole_up(seed):
     """60 s with encoder steps and torque noise, from finite differences of measured angles."""
     recording = simulate(make_simulation('reaction_wheel', seed=seed, controller='balance'), 60.0)

@@ -83,6 +83,7 @@ def upright(tmp_path):
     return load_robot(str(path))
 
 
+@pytest.mark.long
 def test_all_waves_of_a_cogging_are_named(upright):
     """Beside a wave that stands, a smaller one of the same law is nothing unusual."""
     sizes, rng = {12.0: 1.0, 24.0: 0.6, 36.0: 0.16}, np.random.default_rng(2)

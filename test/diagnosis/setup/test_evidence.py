@@ -74,7 +74,10 @@ def test_beside_friction_rows_of_a_held_joint_say_nothing_of_it(slow):
     assert found.left[0] < 0.2 * probe.agreement(Correction.none(1), unknowns=2).left[0]
 
 
-@pytest.mark.parametrize(('periods', 'expected'), [(0.7, []), (2.0, ['clock_offset'])])
+@pytest.mark.parametrize(
+    ('periods', 'expected'),
+    [(0.7, []), pytest.param(2.0, ['clock_offset'], marks=pytest.mark.long)],
+)
 def test_efforts_read_within_a_period_of_the_positions_have_no_other_clock(
     tmp_path, periods, expected
 ):

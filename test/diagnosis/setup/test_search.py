@@ -72,7 +72,8 @@ def test_friction_is_no_error_of_the_connection(folder):
     assert not _found(*_raw(SHARED / folder))
 
 
-@pytest.mark.parametrize('presliding', [0.005, pytest.param(0.02, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize('presliding', [0.005, 0.02])
 def test_friction_that_builds_up_is_no_late_clock(tmp_path, presliding):
     """After each reversal it lags as late efforts would."""
     effects = [f'hysteresis:joint={joint},level={level},presliding={presliding}'

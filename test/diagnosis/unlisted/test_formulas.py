@@ -83,9 +83,11 @@ def _found(equations_for, links, **what):
     [
         (_log_friction, 1, 'a*log(1 + abs(dq[joint0])/v0)*sign(dq[joint0])',
          {'a': -0.5, 'v0': 0.4}),
-        (_brake_and_friction, 1,
-         'a*dq[joint0]/(1 + (dq[joint0]/v0)**2) + d*tanh(dq[joint0]/v_s)',
-         {'a': -0.8, 'v0': 1.5, 'd': -0.3}),
+        pytest.param(
+            _brake_and_friction, 1,
+            'a*dq[joint0]/(1 + (dq[joint0]/v0)**2) + d*tanh(dq[joint0]/v_s)',
+            {'a': -0.8, 'v0': 1.5, 'd': -0.3}, marks=pytest.mark.long,
+        ),
         pytest.param(
             _valve, 2, '(a*tanh((q[joint1] - x0)/w0) + d)*dq[joint0]',
             {'a': -0.8, 'x0': 0.1, 'd': -0.8}, marks=pytest.mark.long,

@@ -287,7 +287,7 @@ def test_a_law_is_found_beside_friction_that_was_not_named(equations_for):
     assert found.laws[0].left[0] < 0.1 * COUNTED_SHARE
 
 
-@pytest.mark.parametrize('is_kept', [True, False])
+@pytest.mark.parametrize('is_kept', [True, pytest.param(False, marks=pytest.mark.long)])
 def test_names_stay_only_beside_a_formula_that_differs_little_too(
     equations_for, monkeypatch, is_kept
 ):
@@ -420,7 +420,7 @@ def test_waves_in_whole_ratios_are_one_periodic_force(equations_for, periods, is
     assert is_series(_waves(*periods), motion) is is_one
 
 
-@pytest.mark.parametrize('is_flap', [True, False])
+@pytest.mark.parametrize('is_flap', [pytest.param(True, marks=pytest.mark.long), False])
 def test_a_series_of_waves_gives_way_to_a_law_that_says_all_of_it(equations_for, is_flap):
     """A pressure on a flap that turns is nearly two waves; two that are waves stay."""
 

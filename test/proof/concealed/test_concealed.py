@@ -183,7 +183,10 @@ def _answer(folder):
 
 @pytest.mark.parametrize(
     'only',
-    ['viscous_friction', pytest.param('hysteresis', marks=pytest.mark.long), draw.PARAMETERS],
+    [
+        'viscous_friction',
+        *(pytest.param(x, marks=pytest.mark.long) for x in ('hysteresis', draw.PARAMETERS)),
+    ],
 )
 def test_the_true_structure_finds_the_true_numbers_and_predicts_what_was_held_out(drawn, only):
     """The simulation shares no code with it. Filters leave up to a thousandth of any robot."""

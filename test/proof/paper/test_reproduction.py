@@ -13,6 +13,8 @@ from sgp_proof.paper.protocol import METHOD_NAMES, SGP_ALL, run_method
 from sgp_ros.cli import main
 from sgp_ros.gp.kernels import Linear
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope='module')
 def wheel():
