@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from sgp_proof.concealed import fifth_families as fifth
+from sgp_proof.concealed import sixth_families as sixth
 from sgp_proof.concealed.balance import Balance
 from sgp_proof.concealed.unknown import NAME
 from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG
@@ -15,9 +16,11 @@ from sgp_ros.physics.parts import PLACES
 
 SMALLEST_SHARE = 0.0042
 LEAST_BEYOND, MOST_BEYOND, MOST_OF_ALL = 0.05, 0.4, 0.6
-"""Shares of a law of the fifth set: beyond plain effects at least and at most, and in all."""
+"""Shares of a law of the fifth set on: beyond plain effects at least and at most, and in all."""
 _TARGETS = {'A': (0.02, 0.2), 'B': (0.006, 0.1)}
 _BEYOND = 0.07, 0.3
+_BEYOND_PLAIN = fifth.FAMILIES | sixth.FAMILIES
+"""Those that are measured by what plain effects cannot absorb of them."""
 _PILOT_S = 10.0
 _ROUNDS = 4
 
@@ -36,20 +39,20 @@ def shares(recording, world):
     return np.mean((balance.needed - balance.given) ** 2, axis=0) / scale
 
 
-def is_of_fifth_set(effect):
+def is_measured_beyond(effect):
     """Return whether an effect is measured by what plain effects cannot absorb of it."""
-    return effect.at.name == NAME and effect.at.parameters['kind'] in fifth.FAMILIES
+    return effect.at.name == NAME and effect.at.parameters['kind'] in _BEYOND_PLAIN
 
 
 def targets(effect, tier):
     """Return the ends of the range from which the share of an effect is drawn."""
-    return _BEYOND if is_of_fifth_set(effect) else _TARGETS[tier]
+    return _BEYOND if is_measured_beyond(effect) else _TARGETS[tier]
 
 
 def is_suitable(recording, world, effect):
     """Return whether the share of an effect counts as physics, and as that of its set."""
     share = own_share(recording, world, effect)
-    if not is_of_fifth_set(effect):
+    if not is_measured_beyond(effect):
         return share >= SMALLEST_SHARE
     whole = float(shares(recording, world)[effect.index])
     return LEAST_BEYOND <= share <= MOST_BEYOND and whole <= MOST_OF_ALL
@@ -72,7 +75,7 @@ def beyond_plain(recording, world, j):
 def own_share(recording, world, effect):
     """Return the share by which the size of an effect is measured."""
     at = effect.at
-    if is_of_fifth_set(effect):
+    if is_measured_beyond(effect):
         return beyond_plain(recording, world, effect.index)
     if at.name == VELOCITY_FILTER_LAG.name:
         clean = recording.shown_velocity[:, effect.index]

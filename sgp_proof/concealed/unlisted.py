@@ -18,6 +18,7 @@ import hashlib
 import json
 import math
 import re
+from collections import ChainMap
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -26,6 +27,7 @@ import numpy as np
 from sgp_proof.concealed import fifth_families as fifth
 from sgp_proof.concealed import fourth_families as fourth
 from sgp_proof.concealed import second_families as second
+from sgp_proof.concealed import sixth_families as sixth
 from sgp_proof.concealed import third_families as third
 from sgp_proof.concealed.family_set import LISTED
 from sgp_proof.concealed.unknown import OF_TIME, force
@@ -83,9 +85,12 @@ FAMILIES = {
     'walk': _walk,
 }
 """Name to force over its size. The last is no function of the motion: nothing is to be found."""
-SECOND_FROM, THIRD_FROM, FOURTH_FROM, FIFTH_FROM = 20_000, 40_000, 60_000, 70_000
+SECOND_FROM, THIRD_FROM, FOURTH_FROM, FIFTH_FROM, SIXTH_FROM = (
+    20_000, 40_000, 60_000, 70_000, 80_000,
+)  # fmt: skip
 """Seeds from here on conceal a law of the second set, of the third, and so on."""
 _SETS = (
+    (SIXTH_FROM, sixth.FAMILIES, ''),
     (FIFTH_FROM, fifth.FAMILIES, ''),
     (FOURTH_FROM, fourth.FAMILIES, ''),
     (THIRD_FROM, third.FAMILIES, ''),
@@ -93,10 +98,10 @@ _SETS = (
     (0, FAMILIES, 'gas_spring'),
 )
 """First seed, laws, and the law of robots of one joint in place of one of another joint."""
-_LATER = third, fourth, fifth
-_LAWS = FAMILIES | second.FAMILIES | third.FAMILIES | fourth.FAMILIES | fifth.FAMILIES
-_REMEMBER = second.REMEMBER | third.REMEMBER | fourth.REMEMBER | fifth.REMEMBER
-_LISTED_PARTS = third.LISTED_PARTS | fourth.LISTED_PARTS | fifth.LISTED_PARTS
+_LATER = third, fourth, fifth, sixth
+_LAWS = dict(ChainMap(FAMILIES, *(x.FAMILIES for x in (second, *_LATER))))
+_REMEMBER = dict(ChainMap(*(x.REMEMBER for x in (second, *_LATER))))
+_LISTED_PARTS = dict(ChainMap(*(x.LISTED_PARTS for x in _LATER)))
 BUILDERS = {name: force(law) for name, law in _LAWS.items()}
 BUILDERS |= {name: x.SET.builder(name) for x in _LATER for name in x.FAMILIES}
 BUILDERS |= {name: second.remembering(*x, _LAWS[name]) for name, x in _REMEMBER.items()}

@@ -13,6 +13,7 @@ import pytest
 from sgp_proof.concealed import fifth_families as fifth
 from sgp_proof.concealed import fourth_families as fourth
 from sgp_proof.concealed import second_families as second
+from sgp_proof.concealed import sixth_families as sixth
 from sgp_proof.concealed import sizes, unlisted
 from sgp_proof.concealed import third_families as third
 from sgp_proof.concealed.unknown import OF_TIME, UNKNOWN
@@ -21,6 +22,7 @@ from sgp_proof.concealed.unlisted import (
     FIFTH_FROM,
     FOURTH_FROM,
     SECOND_FROM,
+    SIXTH_FROM,
     THIRD_FROM,
     family_of,
     law_error,
@@ -82,8 +84,8 @@ def test_the_second_set_is_apart_from_all_others():
     assert set(second.KNOWN_SHAPES) <= set(second.FAMILIES)
 
 
-LATER = third.FAMILIES | fourth.FAMILIES | fifth.FAMILIES
-REMEMBER = third.REMEMBER | fourth.REMEMBER | fifth.REMEMBER
+LATER = third.FAMILIES | fourth.FAMILIES | fifth.FAMILIES | sixth.FAMILIES
+REMEMBER = third.REMEMBER | fourth.REMEMBER | fifth.REMEMBER | sixth.REMEMBER
 EARLIER = set(FAMILIES) | set(second.FAMILIES) | set(UNKNOWN)
 
 
@@ -97,6 +99,7 @@ def _drawn(kind):
         (third.FAMILIES, THIRD_FROM, EARLIER),
         (fourth.FAMILIES, FOURTH_FROM, EARLIER | set(third.FAMILIES)),
         (fifth.FAMILIES, FIFTH_FROM, EARLIER | set(third.FAMILIES) | set(fourth.FAMILIES)),
+        (sixth.FAMILIES, SIXTH_FROM, EARLIER | (set(LATER) - set(sixth.FAMILIES))),
     ],
 )
 def test_a_later_set_is_apart_from_all_others(known, begin, earlier):
@@ -111,7 +114,9 @@ def test_a_later_set_is_apart_from_all_others(known, begin, earlier):
             family_of(seed, has_others=False)
 
 
-@pytest.mark.parametrize(('known', 'begin'), [(fourth, FOURTH_FROM), (fifth, FIFTH_FROM)])
+@pytest.mark.parametrize(
+    ('known', 'begin'), [(fourth, FOURTH_FROM), (fifth, FIFTH_FROM), (sixth, SIXTH_FROM)]
+)
 def test_a_later_set_has_its_seeds_in_order(known, begin):
     """Twenty families, from its first seed on."""
     kinds = [family_of(s, has_others=True) for s in range(begin, begin + 20)]
@@ -126,7 +131,7 @@ def test_other_sets_draw_no_constants():
 @pytest.mark.parametrize('kind', LATER)
 def test_constants_are_drawn_within_their_ranges(kind):
     """And the reach of the source is kept with them."""
-    known = next(x for x in (third, fourth, fifth) if kind in x.FAMILIES)
+    known = next(x for x in (third, fourth, fifth, sixth) if kind in x.FAMILIES)
     for seed in range(5):
         drawn = known.SET.constants(kind, np.random.default_rng(seed), 0.7)
         assert drawn.pop('source_reach') == 0.7
@@ -236,7 +241,8 @@ def test_a_listed_part_may_be_named_beside_the_rest(kind, rest, parameters):
 
 def test_every_listed_part_of_a_law_can_be_scored():
     """The scorer knows the force of each."""
-    parts = third.LISTED_PARTS | fourth.LISTED_PARTS | fifth.LISTED_PARTS
+    known = third, fourth, fifth, sixth
+    parts = {kind: part for x in known for kind, part in x.LISTED_PARTS.items()}
     assert set(parts) <= set(LATER)
     assert set(parts.values()) <= set(unlisted.LISTED)
 
@@ -265,12 +271,26 @@ def test_every_listed_part_of_a_law_can_be_scored():
             {'a': 0.5, 'n': 3.0, 'w': 0.5, 'x': 0.2},
         ),
         ('one_way_pump', '-a*lag(max(dq[elbow], 0), T)', {'a': 1.0 / 1.5, 'T': 0.4}),
+        (
+            'paddle_in_stirred_bath',
+            '-a*(dq[elbow] - lag(dq[elbow], T))*abs(dq[elbow] - lag(dq[elbow], T))',
+            {'a': 0.5 / 1.5**2, 'T': 0.5},
+        ),
+        (
+            'magnet_in_oil', '-a*sin(n*(q[elbow] - lag(q[elbow], T)))',
+            {'a': 0.5, 'n': 3.0, 'T': 0.6},
+        ),
+        (
+            'bucket_filled_by_motion', '-a*lag(abs(dq[elbow]), T)*sin(n*q[elbow] + x)',
+            {'a': 0.75 / 1.5, 'T': 0.4, 'n': 2.0, 'x': 0.3},
+        ),
     ],
 )  # fmt: skip
 def test_laws_that_remember_are_compared_along_a_motion(kind, formula, numbers):
     """But for the steps of that motion; without its memory none of them is right."""
     chosen = {'fill_s': 0.25, 'heat': 0.9, 'warm_s': 2.0, 'slack': 0.25, 'knee': 0.3,
-              'stroke': 0.6, 'leak_s': 0.4, 'poles': 3.0, 'phase': 0.2}  # fmt: skip
+              'stroke': 0.6, 'leak_s': 0.4, 'poles': 3.0, 'phase': 0.2,
+              'follow_s': 0.5, 'oil_s': 0.6, 'swing': 2.0, 'lean': 0.3}  # fmt: skip
     effect = {'joint': 'elbow', 'parameters': {**P, **chosen, 'kind': kind}}
     finding = {'formula': f'tau_x[elbow] = {formula}',
                'parameters': {name: {'value': x} for name, x in numbers.items()}}  # fmt: skip
@@ -299,7 +319,7 @@ def test_time_may_stand_in_the_formula_of_a_law_that_changes_with_it():
     ('formula', 'low', 'high'),
     [(lambda q, v: 3.0 * q - v + np.sign(v) + 0.5, 0.0, 1e-9), (lambda q, _v: q**2, 0.1, 1.0)],
 )
-def test_the_fifth_set_is_measured_by_what_plain_effects_leave(monkeypatch, formula, low, high):
+def test_a_set_is_measured_by_what_plain_effects_leave(monkeypatch, formula, low, high):
     """Nothing of plain effects, most of another force."""
     t = np.arange(4000) * 0.01
     q, v, a = (x[:, np.newaxis] for x in (np.sin(t), np.cos(t), -np.sin(t)))
