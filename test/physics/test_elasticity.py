@@ -148,7 +148,17 @@ def test_a_rotor_that_the_robot_file_lacks_is_told_from_the_link():
     inside = EffectAt(LAW, Place(ELBOW, 'motor'), np.array([0.1 * link, *spring.shape[1:]]))
     moved_out = fit(columns, (beside, inside), start, is_free=False)
     assert moved_out.effects[1].place.kind == BARE
-    assert screen(columns, moved_out, [LAW], [ELBOW]) == []  # a joint has one spring
+
+
+def test_a_joint_has_one_spring():
+    """Whatever it leaves, no other one is looked for there."""
+    found = equations('motor')
+    columns, start = Columns(found), np.sqrt((found.d**2).mean(axis=0)) + 1e-9
+    alone = fit(columns, (), start, is_free=False)
+    shape = np.array([J, 1.0 / STIFFNESS, 0.0, 0.0])
+    spring = EffectAt(LAW, Place(ELBOW, 'motor'), shape, np.ones(1))
+    assert screen(columns, alone, [LAW], [ELBOW])
+    assert screen(columns, replace(alone, effects=(spring,)), [LAW], [ELBOW]) == []
 
 
 @pytest.mark.parametrize('entry', [1, 2])
