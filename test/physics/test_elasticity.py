@@ -151,7 +151,7 @@ def test_a_rotor_that_the_robot_file_lacks_is_told_from_the_link():
 
 
 def test_a_joint_has_one_spring():
-    """Whatever it leaves, no other one is looked for there."""
+    """No other one is looked for there, however much it leaves."""
     found = equations('motor')
     columns, start = Columns(found), np.sqrt((found.d**2).mean(axis=0)) + 1e-9
     alone = fit(columns, (), start, is_free=False)
