@@ -27,6 +27,11 @@ def has_rotor(place: Place, effects: Sequence[EffectAt]) -> bool:
                                                         if s.effect.is_inertial}  # fmt: skip
 
 
+def is_in_file(place: Place) -> bool:
+    """Return whether what is behind a motor with the encoder takes that motor from the file."""
+    return is_on_motor(place) and place.kind != BARE
+
+
 def is_bare(joint: int, effects: Sequence[EffectAt], motion: SeenMotion) -> bool:
     """Return whether effects add most of a motor to a joint, whose file then has none."""
     added = sum(float(s.coefficients[0]) for s in effects
@@ -56,7 +61,7 @@ def beside_rotors(effects: Sequence[EffectAt], motion: SeenMotion) -> tuple[Effe
     """Return effects with the motor of a spring outside the robot file where it has a rotor."""
     return tuple(
         replace(s, place=replace(s.place, kind=BARE))
-        if isinstance(s.effect, JointElasticity) and is_on_motor(s.place)
-        and s.place.kind != BARE and is_bare(s.place.joint, effects, motion) else s
+        if isinstance(s.effect, JointElasticity) and is_in_file(s.place)
+        and is_bare(s.place.joint, effects, motion) else s
         for s in effects
     )  # fmt: skip

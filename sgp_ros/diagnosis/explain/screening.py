@@ -13,9 +13,8 @@ from sgp_ros.diagnosis.explain.products import Products, Rest
 from sgp_ros.diagnosis.explain.regression import Columns, Seen, dry_joints
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt, in_series
-from sgp_ros.physics.elasticity import is_on_motor
 from sgp_ros.physics.memory import BARE
-from sgp_ros.physics.motor_beside import has_rotor, is_bare
+from sgp_ros.physics.motor_beside import has_rotor, is_bare, is_in_file
 from sgp_ros.physics.parts import Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 
@@ -86,18 +85,21 @@ def _free_places(effect: Effect, model: Model, motion: ObservedMotion) -> Iterat
     motor is behind the one that the model has.
     """
     places = effect.places(motion)
-    is_of_motor = any(p.kind == BARE for p in places)
+    is_behind = any(p.kind == BARE for p in places)
     for place in places:
-        is_stated = is_of_motor and is_on_motor(place) and place.kind != BARE
-        has_one = any(s.effect is effect and s.place.joint == place.joint for s in model.effects)
-        is_one = is_stated and is_bare(place.joint, model.effects, motion)
-        if is_one or (is_of_motor and has_one):
+        if is_behind and _is_taken(effect, place, model, motion):
             continue
         here = [s.place.number for s in model.effects if _is_like(s, effect, place)]
         if not here:
             yield place
         elif effect.wave(motion, place) is not None or (may_be_two(effect) and len(here) == 1):
             yield replace(place, number=1 + max(here))
+
+
+def _is_taken(effect: Effect, place: Place, model: Model, motion: ObservedMotion) -> bool:
+    """Return whether a joint has the law behind its motor, or another motor than the place has."""
+    has_one = any(s.effect is effect and s.place.joint == place.joint for s in model.effects)
+    return has_one or (is_in_file(place) and is_bare(place.joint, model.effects, motion))
 
 
 def _is_like(s: EffectAt, effect: Effect, place: Place) -> bool:
