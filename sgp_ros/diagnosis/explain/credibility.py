@@ -24,6 +24,8 @@ from sgp_ros.physics.motor_beside import has_rotor
 from sgp_ros.physics.parts import MOTOR
 from sgp_ros.robots.observed_motion import ObservedMotion
 
+_SAME = 0.01
+"""Relative difference of rests of models that are the same one, found twice [1]."""
 _MANY = 20.0
 """Whole waves that are more than a wave of three numbers could follow by chance."""
 
@@ -158,6 +160,12 @@ def _is_confined(s: EffectAt, motion: ObservedMotion) -> bool:
         return True
     q = motion.wrapped[:, s.place.joint]
     return float(sum(((q >= a) & (q <= b)).mean() for a, b in inside[1])) < WIDEST
+
+
+def trace(model: Model) -> tuple[object, ...]:
+    """Return laws, freedom and rest of a model, by which two searches know that they have met."""
+    rest = np.round(np.log(model.sigma) / _SAME)
+    return model.key, model.is_free, *rest.tolist()
 
 
 def ranked(models: Iterable[Model]) -> list[Model]:

@@ -17,7 +17,7 @@ import numpy as np
 from sgp_ros.diagnosis.compare.settled import shows
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, EVIDENCE, SLIGHT_REST
 from sgp_ros.diagnosis.explain.candidates import fit
-from sgp_ros.diagnosis.explain.credibility import acting_share, gain, is_credible
+from sgp_ros.diagnosis.explain.credibility import acting_share, gain, is_credible, trace
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.growth import (
     Block,
@@ -46,6 +46,9 @@ _BUILT_UP = 0.3
 def by_joint(columns: Columns, model: Model) -> list[Model]:
     """Return the model that a search joint by joint ends with, and its rivals of one change.
 
+    Searches from several starts meet: a joint at which a model was looked at in vain is not looked
+    at again, and nothing is returned where another search ended with the same model.
+
     Args:
         columns: of the recording.
         model: to start from; its freedom of the bodies is kept.
@@ -54,8 +57,15 @@ def by_joint(columns: Columns, model: Model) -> list[Model]:
     for _ in range(SWEEPS):
         before = model.key
         for block in blocks_of(model):
-            model = _shrunk(columns, grown(columns, model, block), block)
+            asked = block.joints, trace(model)
+            if asked not in columns.settled:
+                found = _shrunk(columns, grown(columns, model, block), block)
+                columns.settled.update([asked] if found is model else [])
+                model = found
         if model.key == before:
+            if trace(model) in columns.settled:
+                return []
+            columns.settled.add(trace(model))
             others = (*coupled(columns, model), *two_for_one(columns, model))
             better = best_of(model, others)
             if better is None:

@@ -23,7 +23,11 @@ MOST_SLOPES = 15_000_000
 
 
 class Columns:
-    """Filtered columns of candidates, remembered."""
+    """Filtered columns of candidates, remembered.
+
+    Attributes:
+        settled: what searches on them have looked at in vain.
+    """
 
     def __init__(self, equations: Equations) -> None:
         self._equations = {frozenset[int](): equations}
@@ -31,6 +35,7 @@ class Columns:
         self._edges: dict[tuple[object, ...], np.ndarray | None] = {}
         self._motions: dict[bytes, ObservedMotion] = {}
         self._held = 0
+        self.settled = set[object]()
 
     def equations(self, dry: frozenset[int]) -> Equations:
         """Return the equations in which dry friction may hold some joints."""

@@ -22,7 +22,7 @@ from sgp_ros.diagnosis.decide.cross_validation import support
 from sgp_ros.diagnosis.explain import growth, joint_search
 from sgp_ros.diagnosis.explain.candidates import fit, split
 from sgp_ros.diagnosis.explain.credibility import gain, is_credible
-from sgp_ros.diagnosis.explain.fitted_model import beyond_plain, floors
+from sgp_ros.diagnosis.explain.fitted_model import beyond_plain, first_scale, floors
 from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.growth import Block, crossed, grown, two_for_one
 from sgp_ros.diagnosis.explain.joint_search import (
@@ -79,6 +79,19 @@ def test_every_joint_gets_the_laws_that_it_lacks(equations):
     assert _keys(found) == TRUTH
     assert all(gain(rival, found) <= 0.0 for rival in rivals)
     assert any(len(rival.effects) < len(found.effects) for rival in rivals)
+
+
+def test_searches_that_meet_look_once(monkeypatch, equations):
+    """From the laws that a search ended with, another one ends without a fit of candidates."""
+    columns = Columns(equations)
+    found, *_ = by_joint(columns, fit(columns, (), first_scale(equations)))
+    monkeypatch.setattr(joint_search, 'grown', None)  # nothing is looked at
+    assert by_joint(columns, found) == []
+    apart = replace(found, sigma=1.1 * found.sigma)
+    with pytest.raises(TypeError):
+        by_joint(columns, apart)
+    with pytest.raises(TypeError):
+        by_joint(Columns(equations), found)
 
 
 def test_each_joint_takes_its_laws_from_the_model_that_describes_it_best(equations):
