@@ -15,8 +15,15 @@ from sgp_ros.diagnosis.compare.sufficiency import require_rows
 from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
 from sgp_ros.diagnosis.compare.volume import noisy_volume
 from sgp_ros.diagnosis.criteria import NEARLY
-from sgp_ros.diagnosis.decide.differences import Several, decide_several
+from sgp_ros.diagnosis.decide.decision import calm
+from sgp_ros.diagnosis.decide.differences import Several, decide_several, force_of
 from sgp_ros.diagnosis.decide.scale import Scale
+from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.explain.comparison import Comparison
+from sgp_ros.diagnosis.explain.fitted_model import first_scale
+from sgp_ros.diagnosis.explain.in_recording import own_laws
+from sgp_ros.diagnosis.explain.joint_search import without_vain
+from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.gathered import Recordings
 from sgp_ros.diagnosis.result import Equivalent, Finding
 from sgp_ros.diagnosis.setup.correction import Correction
@@ -151,17 +158,48 @@ def compared(
     recordings: Recordings, tree: Tree, progress: Callable[[float], None], most_hz: float = np.inf
 ) -> Connected:
     """Return the models that are compared on recordings as they are, up to a cut-off [Hz]."""
+    of = equations_of(recordings, tree, most_hz)
+    equations, count = of(recordings.learned), len(recordings.names)
+    several = decide_several(
+        equations, count, progress, lambda r: of(alone(recordings.learned, r))
+    )
+    return Connected(recordings, equations, several, remarks=recordings.remarks)
+
+
+def equations_of(
+    recordings: Recordings, tree: Tree, most_hz: float = np.inf
+) -> Callable[[RawTrajectory], Equations]:
+    """Return what makes equations of a part of recordings, up to a cut-off [Hz]."""
     bandwidth = choose_bandwidth(recordings.learned, tree)
     if bandwidth.cutoff > most_hz:
         state_cutoff = bandwidth.state_cutoff * most_hz / bandwidth.cutoff
         bandwidth = replace(bandwidth, cutoff=most_hz, state_cutoff=state_cutoff)
     require_rows(recordings.learned, bandwidth)
+    return lambda raw: make_equations(raw, tree, bandwidth, recordings.unstated)
 
-    def equations_of(raw: RawTrajectory) -> Equations:
-        return make_equations(raw, tree, bandwidth, recordings.unstated)
 
-    equations, count = equations_of(recordings.learned), len(recordings.names)
-    several = decide_several(
-        equations, count, progress, lambda r: equations_of(alone(recordings.learned, r))
-    )
-    return Connected(recordings, equations, several, remarks=recordings.remarks)
+def foreseen(plain: Connected, correction: Correction, tree: Tree) -> Connected:
+    """Return what corrected recordings say with the laws of those as they are, or fewer.
+
+    A correction that makes some of these laws needless shows it without a search for others.
+
+    Args:
+        plain: recordings as they are, with the models that were compared on them.
+        correction: of errors of the connection.
+        tree: nominal robot.
+    """
+    recordings = plain.recordings.corrected(correction)
+    equations = equations_of(recordings, correction.tree(tree))(recordings.learned)
+    of = plain.several.model
+    model = fit(Columns(equations), of.effects, first_scale(equations), is_free=of.is_free)
+    own = own_laws(model.effects)
+    left = replace(equations, d=equations.d - force_of(model, own)) if own else equations
+    columns, start = Columns(left), first_scale(left)
+    bases = [fit(columns, (), start, is_free=is_free) for is_free in (False, True)]
+    comparison, common = Comparison(bases[0], bases[1], (), ()), plain.several.decision.model
+    tried = [fit(columns, common.effects, model.sigma, is_free=m.is_free, w=m.w) for m in bases]
+    scale = Scale.of(left, comparison)
+    best = max((*bases, *(without_vain(columns, m) for m in tried)), key=scale.worth)
+    decision = replace(calm(comparison.base, (), scale), model=best, verdict='missing_physics')
+    several = Several(left, comparison, decision, model, {})
+    return Connected(recordings, equations, several, correction)

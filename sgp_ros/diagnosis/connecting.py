@@ -15,7 +15,7 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.equations import joint_name
-from sgp_ros.diagnosis.connected import Connected, compared
+from sgp_ros.diagnosis.connected import Connected, compared, foreseen
 from sgp_ros.diagnosis.criteria import (
     ALIKE,
     INTERVAL,
@@ -120,7 +120,7 @@ def _connected(
         each: progress of one comparison after the other.
         corrected: what was compared with these errors undone, where that is known.
     """
-    if not found.errors:
+    if not found.errors or (corrected is None and _is_hopeless(plain, found, tree)):
         return plain
     corrected = corrected or _undone(plain, found, tree, each)
     if _is_taken_back(corrected, found):
@@ -164,6 +164,19 @@ def _undone(
     correction = found.errors[-1].correction
     recordings, whole = plain.recordings.corrected(correction), correction.tree(tree)
     return replace(compared(recordings, whole, next(each)), correction=correction)
+
+
+def _is_hopeless(plain: Connected, found: Connection, tree: Tree) -> bool:
+    """Return whether errors are worth much too little with the laws found without them, or fewer.
+
+    Where these explain the recordings as they are, a comparison of all models on corrected ones
+    finds hardly more than with such laws, and takes as long as everything before.
+    """
+    if plain.verdict == 'unexplained':
+        return False
+    correction, (price, rare) = found.errors[-1].correction, price_of(found)
+    corrected = foreseen(plain, correction, tree)
+    return _gain(plain, corrected, price) + rare < -2.0 * ALIKE
 
 
 def _is_taken_back(corrected: Connected, found: Connection) -> bool:

@@ -8,11 +8,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sgp_ros.batch.acceptance import USUAL
 from sgp_ros.diagnosis import connected
 from sgp_ros.diagnosis.connected import Connected
+from sgp_ros.diagnosis.criteria import PER_EFFECT
+from sgp_ros.diagnosis.gathered import Knowledge, gather
 from sgp_ros.diagnosis.result import Finding, Location
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.unknowns import Agreement
+from test.diagnosis.worlds import CHAINS, events_of, simulate
 
 
 @dataclass(frozen=True)
@@ -135,3 +139,29 @@ def test_what_is_found_with_an_error_of_the_connection_too_is_as_certain():
     assert beside.against_rivals(replace(friction, effect='spring')).probability == 0.9
     elsewhere = replace(friction, effect='spring', joint='hip')
     assert beside.against_rivals(elsewhere).probability == pytest.approx(0.45)
+
+
+@pytest.mark.parametrize(
+    ('offset', 'undone', 'is_alike'),
+    [(0.0, {}, True), (0.0, {'effort_scale': -1.0}, False), (0.4, {'offset': 0.4}, False)],
+)
+def test_a_correction_shows_with_the_laws_that_were_found(robots, offset, undone, is_alike):
+    """Bodies that stood for an offset go with it; a sign that is right has no other."""
+    robot, tree = robots[1]
+    world = simulate(CHAINS[1], 3, 20.0, force=lambda _t, _q, v: (-0.3 * v[0],))
+    events = events_of(replace(world, position=world.position + offset))
+    recordings = gather({'': events}, {}, tree, Knowledge(robot, (), USUAL), holds_out=False)
+    plain = connected.compared(recordings, tree, lambda _: None)
+    numbers = {name: np.array([x]) for name, x in undone.items()}
+    found = connected.foreseen(plain, replace(Correction.none(1), **numbers), tree)
+    nominal, power = np.minimum(plain.nominal, found.nominal), plain.equations.power
+    gain = found.worth(nominal, power) - plain.worth(nominal, power)
+    laws = [[s.name for s in x.several.decision.model.effects] for x in (plain, found)]
+    if is_alike:
+        assert laws == [['viscous_friction']] * 2
+        assert gain == pytest.approx(0.0, abs=0.5)
+    elif offset:
+        assert laws[1] == ['viscous_friction']
+        assert gain > PER_EFFECT
+    else:
+        assert gain < -100.0

@@ -32,7 +32,7 @@ def _of(cutoff, verdict='missing_physics'):
 def _found(monkeypatch, compare, numbers):
     """Return an error of the connection that is worth its price, with what compares recordings."""
     for name, stub in {
-        'compared': compare, '_gain': lambda *_: 100.0,
+        'compared': compare, '_gain': lambda *_: 100.0, 'foreseen': lambda *_: None,
         'error_finding': lambda *_: SimpleNamespace(probability=0.99),
         'equal_errors': lambda _: (), '_stands_for_gains': lambda *_: False,
         'setup_advice': lambda _: 'advice',
@@ -74,6 +74,23 @@ def test_a_band_is_compared_once(monkeypatch, plain, corrected, times):
     assert connecting._connected(_of(plain), found, None, each).correction is correction
     assert len(compared) == times
     assert compared[-1] == corrected
+
+
+@pytest.mark.parametrize(
+    ('verdict', 'gain', 'is_compared'),
+    [('missing_physics', -1.0 - 2.0 * ALIKE, False), ('missing_physics', 1.0 - 2.0 * ALIKE, True),
+     ('unexplained', -1.0 - 2.0 * ALIKE, True)],
+)  # fmt: skip
+def test_errors_without_hope_are_not_compared(monkeypatch, verdict, gain, is_compared):
+    """Unless the recording is unexplained as it is, for then its laws foresee nothing."""
+    compared = []
+    found = _found(monkeypatch, lambda *_: compared.append(1) or _of(10.0), ())
+    monkeypatch.setattr(connecting, '_gain', lambda *_: gain)
+    monkeypatch.setattr(connecting, 'price_of', lambda _: (0.0, 0.0))
+    plain = _of(10.0, verdict)
+    said = connecting._connected(plain, found, None, in_halves(lambda _: None))
+    assert said is plain
+    assert bool(compared) is is_compared
 
 
 @pytest.mark.parametrize(
@@ -168,6 +185,7 @@ def test_an_error_that_is_not_certain_must_be_worth_it_beside_physics(
     monkeypatch.setattr(Correction, 'tree', lambda _self, tree: tree)
     for name, stub in {
         'compared': lambda *_: _of(10.0), '_gain': gain, '_named': lambda _: frozenset(),
+        '_is_hopeless': lambda *_: False,
         'price_of': lambda found: (10.0, 10.0 * (len(found.errors) - 1)),
         'equal_errors': lambda _: (), '_stands_for_gains': lambda *_: False,
         'error_finding': lambda found, i, _gain: SimpleNamespace(

@@ -92,7 +92,7 @@ def decide_several(
     own = own_laws(model.effects)
     if not own:
         return Several(equations, comparison, decision, decision.model, {})
-    left = replace(equations, d=equations.d - _force(model, own))
+    left = replace(equations, d=equations.d - force_of(model, own))
     comparison = compare_models(left, lambda share: progress(0.5 + 0.4 * share))
     decision = decide(left, comparison)
     model = search.possible(search.fitted(decision.model, (*decision.model.effects, *own)))
@@ -112,7 +112,7 @@ def _start(comparison: Comparison, decision: Decision, scale: Scale) -> Model:
     return max((decision.model, *models), key=scale.worth)
 
 
-def _force(model: Model, some: tuple[EffectAt, ...]) -> np.ndarray:
+def force_of(model: Model, some: tuple[EffectAt, ...]) -> np.ndarray:
     """Return the filtered force of some effects of a model, (N, k) [N m or N]."""
     parts = zip(model.effects, model.forces, strict=True)
     return np.asarray(sum(force for s, force in parts if s in some))
