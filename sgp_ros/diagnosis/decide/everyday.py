@@ -3,9 +3,10 @@
 A joint that no model describes may still have the friction that every joint has. It stands where
 it does not lean on the rest: fitted in each half of each variable alone, beside bodies of any
 kind, it is nearly the force that it is in the whole. Where much of the rest is a friction, of
-another form or one that another variable changes, what is unknown is the friction itself. The
-larger the rest is beside it, the nearer the halves must be: it may be a part of the unknown.
-The intervals of its numbers hold those of all halves, for the rest that bends them is not noise.
+another form, of earlier speeds or one that another variable changes, what is unknown is the
+friction itself. The larger the rest is beside it, the nearer the halves must be: it may be a part
+of the unknown. The intervals of its numbers hold those of all halves, for the rest that bends them
+is not noise.
 """
 
 from __future__ import annotations
@@ -30,12 +31,15 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.physics.catalogue import COMMAND_DELAY, COULOMB_FRICTION, VISCOUS_FRICTION
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.law import remembered
 from sgp_ros.physics.parts import Place
 from sgp_ros.physics.servo import Servo
 
 ROWS_PER_COLUMN = 4
 """Least rows of a half for each column."""
 _KNOTS = 8
+SHORTEST_LAG, LONGEST_LAG = 3.0, 0.1
+"""Lags that are looked for: from so many steps to this part of a recording."""
 
 
 def with_everyday(equations: Equations, comparison: Comparison, decision: Decision) -> Decision:
@@ -141,13 +145,16 @@ def _in_halves(
     Returns:
         Greatest difference of each number, (m,); of the force, relative. Infinite where the rows
         of a half are too few, or where much of the rest is another friction: one of another form
-        over the speed, or with other numbers in one half.
+        over the speed, of earlier speeds, or with other numbers in one half.
     """
     A = np.column_stack([forces / numbers, moving_bodies(equations, joint), np.ones(len(y))])
     halves, force = list(_halves(equations, joint)), forces.sum(axis=1)
     least = (1.0 - NEARLY) * _rest(A, y)
     richer = (_of_speed(equations, joint), *(forces * half[:, None] for half in halves))
-    if any(_rest(np.column_stack([A, more]), y) < least for more in richer):
+    placed = np.column_stack([A, _of_position(equations, joint)])
+    past = np.column_stack([placed, _of_earlier_speeds(equations, joint)])
+    is_past = _rest(past, y) < (1.0 - NEARLY) * _rest(placed, y)
+    if is_past or any(_rest(np.column_stack([A, more]), y) < least for more in richer):
         return np.zeros(len(numbers)), math.inf
     far, apart = np.zeros(len(numbers)), 0.0
     for half in (*halves, *(~x for x in halves)):
@@ -177,6 +184,23 @@ def _of_speed(equations: Equations, joint: int) -> np.ndarray:
     knots = np.quantile(np.abs(v), np.linspace(0.0, 1.0, _KNOTS))
     hats = [np.interp(np.abs(v), knots, height) * np.sign(v) for height in np.eye(_KNOTS)]
     return equations.compact(np.column_stack(hats), joint, is_inertial=False)
+
+
+def _of_position(equations: Equations, joint: int) -> np.ndarray:
+    """Return the columns of a force of any form of a joint's position."""
+    q = equations.motion.position[:, joint]
+    knots = np.unique(np.quantile(q, np.linspace(0.0, 1.0, _KNOTS)))
+    hats = [np.interp(q, knots, height) for height in np.eye(len(knots))]
+    return equations.compact(np.column_stack(hats), joint, is_inertial=False)
+
+
+def _of_earlier_speeds(equations: Equations, joint: int) -> np.ndarray:
+    """Return the columns of lags of a joint's speed, such as a fluid that follows it has."""
+    motion = equations.motion
+    v, whole = motion.velocity[:, joint], motion.step * len(motion.position)
+    lags = np.geomspace(SHORTEST_LAG * motion.step, LONGEST_LAG * whole, _KNOTS)
+    past = [remembered('lag', motion, v, float(x)) for x in lags]
+    return equations.compact(np.column_stack(past), joint, is_inertial=False)
 
 
 def _halves(equations: Equations, joint: int) -> Iterator[np.ndarray]:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import BSpline
 
+from sgp_ros.diagnosis.decide.everyday import LONGEST_LAG
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
@@ -29,8 +30,6 @@ PIECES, FINE = 8, 16
 _DEGREE = 3
 MEMORY = 'T'
 """Parameter of what remembers."""
-SHORTEST_LAG, LONGEST_LAG = 3.0, 0.1
-"""Lags that are looked for: from so many steps to this part of a recording."""
 LEAST_PLAY, MOST_PLAY = 0.02, 0.9
 """Play that is looked for, in parts of the range that was seen."""
 _LADDER = 7

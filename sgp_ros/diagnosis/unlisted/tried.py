@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from sgp_ros.diagnosis.criteria import ALIKE, NEARLY
+from sgp_ros.diagnosis.decide.everyday import SHORTEST_LAG
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
@@ -24,7 +25,6 @@ from sgp_ros.diagnosis.unlisted.shapes import (
     LEAST_PLAY,
     MORE_GATES,
     PIECES,
-    SHORTEST_LAG,
     SmoothForce,
     Variable,
 )

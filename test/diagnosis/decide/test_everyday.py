@@ -87,6 +87,25 @@ def test_what_leaks_has_no_friction_beside_it(equations_for, leak_s):
     assert not found.standing
 
 
+class _Stirred:
+    """Drag of a paddle in a fluid that follows it."""
+
+    def __init__(self, follow_s):
+        self.follow_s, self.fluid, self.t = follow_s, 0.0, 0.0
+
+    def __call__(self, t, _q, v):
+        self.fluid += (v[0] - self.fluid) * min((t - self.t) / self.follow_s, 1.0)
+        self.t = t
+        return (-0.6 * abs(v[0] - self.fluid) * (v[0] - self.fluid),)
+
+
+@pytest.mark.parametrize('follow_s', [0.4, 0.9])
+def test_drag_in_a_fluid_that_follows_is_no_friction_beside_it(equations_for, follow_s):
+    """It resists the motion as friction does, and earlier speeds say how much."""
+    found = _decided(equations_for, force=_Stirred(follow_s))[2]
+    assert not found.standing
+
+
 def test_findings_have_its_probability_and_interval(rubbed):
     equations, comparison, _ = rubbed
     unexplained = _unexplained(equations)[1]
