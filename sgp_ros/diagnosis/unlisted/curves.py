@@ -12,6 +12,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -114,14 +115,16 @@ class Followed:
 
 
 def follow(
-    formula: Formula, curve: Curve, ranges: Mapping[str, tuple[float, float]]
-) -> Followed | None:
+    formula: Formula, curve: Curve, ranges: Mapping[str, tuple[float, float]],
+    near: Mapping[str, float] = MappingProxyType({}),
+) -> Followed | None:  # fmt: skip
     """Return how a formula in `q[X]` follows a curve best; None if nowhere finite.
 
     Args:
         formula: text with the variable as `q[X]`.
         curve: to follow.
         ranges: ends of its parameters but coefficients, equal where one is known.
+        near: numbers of some of them, where the search starts.
     """
     free = [n for n in sorted(formula.parameters) if n not in COEFFICIENTS]
     axes = _Axes(*np.array([ranges[n] for n in free]).reshape(-1, 2).T)
@@ -131,15 +134,15 @@ def follow(
         return _left(columns(axes.at(u)), curve)
 
     known = axes.high <= axes.low
-    u = _starts(free, axes)
+    u = _starts(free, axes, near)
     _, cost = left(u)
-    u = u[np.argsort(cost)[:_KEPT]]
+    u = u[np.argsort(cost)[: min(_KEPT, int(np.isfinite(cost).sum()))]]
+    if not len(u):
+        return None
     if len(free) > known.sum():
         u = _improved(u, left, ~known)
     _, cost = left(u)
     best = int(np.argmin(cost))
-    if not np.isfinite(cost[best]):
-        return None
     return Followed(dict(zip(free, axes.at(u)[best].tolist(), strict=True)), float(cost[best]))
 
 
@@ -171,7 +174,7 @@ class _Axes:
         return is_ratio, safe, np.where(is_ratio, self.high, 1.0) / safe
 
 
-def _starts(free: Sequence[str], axes: _Axes) -> np.ndarray:
+def _starts(free: Sequence[str], axes: _Axes, near: Mapping[str, float]) -> np.ndarray:
     """Return the starts of a search, (s, k) parts of the ways between the ends.
 
     A place that belongs to a wave starts within one of its turns around the middle.
@@ -179,7 +182,7 @@ def _starts(free: Sequence[str], axes: _Axes) -> np.ndarray:
     known = axes.high <= axes.low
     waves = {f'x{n[1:]}': i for i, n in enumerate(free) if n[0] == 'n'}
     counts = [
-        1 if is_known else _WAVES if n[0] == 'n' else _STARTS
+        1 if is_known or n in near else _WAVES if n[0] == 'n' else _STARTS
         for n, is_known in zip(free, known, strict=True)
     ]
     grid = list(itertools.product(*((np.arange(m) + 0.5) / m for m in counts)))
@@ -189,6 +192,7 @@ def _starts(free: Sequence[str], axes: _Axes) -> np.ndarray:
         if name in waves:
             middle, turn = 0.5 * (axes.low[i] + axes.high[i]), 2.0 * np.pi / at[:, waves[name]]
             at[:, i] = middle + (u[:, i] - 0.5) * turn
+        at[:, i] = near.get(name, at[:, i])
     return axes.parts(at)
 
 

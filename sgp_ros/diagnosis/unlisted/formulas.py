@@ -11,7 +11,7 @@ follow it best become laws as a user could write them, with units.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,17 +24,10 @@ from sgp_ros.diagnosis.unlisted.sentences import (
     of_position,
     of_velocity,
     smoothed,
+    sums,
 )
-from sgp_ros.diagnosis.unlisted.shapes import (
-    MEMORY,
-    RATIO,
-    SLOWEST,
-    SMOOTHED,
-    UNITS,
-    SmoothForce,
-    Variable,
-    smooth_of,
-)
+from sgp_ros.diagnosis.unlisted.shapes import SLOWEST, SMOOTHED, UNITS, SmoothForce, smooth_of
+from sgp_ros.diagnosis.unlisted.variables import FORCES, MEMORY, RATIO, Variable
 from sgp_ros.physics.formula import Formula, read_formula
 from sgp_ros.physics.law import FormulaLaw
 from sgp_ros.physics.motion import SeenMotion
@@ -77,6 +70,8 @@ _WAVES = (0.15, 4.5)
 """Periods of a sine within the range that was seen, least and greatest."""
 _WIDE = 5.0
 """Range in which some part of every formula is not zero, in parts of the greatest value."""
+_SUMMED = 3
+"""Best texts of one term to which a second one is added."""
 _PIECES = 100
 """Of a curve, even."""
 _NARROWEST, _WIDEST = 1.0 / _PIECES, 3.0
@@ -154,21 +149,30 @@ def formulas(
         floor: sum of squares that errors of signals and filters may leave.
         count: of texts.
     """
-    seen = Range.of_variable(smooth.variable, motion)
-    found: list[tuple[float, str, Followed]] = []
-    noise = curve.rest + floor
-    for text in texts(smooth):
-        formula = read_formula(text.replace('X', 'q[X]'), is_law=True)
-        shape = [n for n in formula.parameters if n not in COEFFICIENTS]
-        followed = follow(formula, curve, {n: seen.ends(n)[:2] for n in shape})
-        if followed is not None:
-            left = (followed.left + noise) / (curve.size + noise)
-            freedom = PER_PARAMETER * len(formula.parameters - {'r'})
-            price = freedom + PER_PIECE * _pieces(formula)
-            found.append((0.5 * ROWS * math.log(left) + price, text, followed))
+    seen, noise = Range.of_variable(smooth.variable, motion), curve.rest + floor
+
+    def tried(some: Iterable[str], near: Mapping[str, float]) -> Iterator[_Tried]:
+        for text in some:
+            formula = read_formula(text.replace('X', 'q[X]'), is_law=True)
+            shape = [n for n in formula.parameters if n not in COEFFICIENTS]
+            followed = follow(formula, curve, {n: seen.ends(n)[:2] for n in shape}, near)
+            if followed is not None:
+                left = (followed.left + noise) / (curve.size + noise)
+                freedom = PER_PARAMETER * len(formula.parameters - {'r'})
+                price = freedom + PER_PIECE * _pieces(formula)
+                yield 0.5 * ROWS * math.log(left) + price, text, followed
+
+    found = sorted(tried(texts(smooth), {}), key=lambda f: f[0])
+    for _, text, followed in [f for f in found if ' + b' not in f[1]][:_SUMMED]:
+        term, is_position = text.removesuffix(' + d'), smooth.variable.kind == 'q'
+        found += tried(sums(term, is_position=is_position), followed.numbers)
     found.sort(key=lambda f: f[0])
     for _, text, followed in found[:count]:
         yield law(smooth, motion, seen, text, followed.numbers)
+
+
+_Tried = tuple[float, str, Followed]
+"""Worth of a text [nats, less is better], the text, and how it follows the curve."""
 
 
 ROWS = 100.0
@@ -217,17 +221,20 @@ def law(
 ) -> FoundLaw:  # fmt: skip
     """Return a text as a law of the joint of a smooth force."""
     own = 'm' if motion.tree.is_prismatic[smooth.joint] else 'rad'
-    force = 'N' if own == 'm' else 'N m'
-    per = '1' if smooth.is_of_own_speed else UNITS[smooth.gate].format(l=own, f=force)
+    known = smooth.known_factor
+    force = FORCES[own] if known is None else known.unit
+    others = {p.name: p for p in known.parameters} if known else {}
+    per = '1' if smooth.is_of_own_speed or known else smooth.factor_unit(motion.tree)
     plain = text.replace('X', smooth.variable.text)
     whole = _times(plain, '' if smooth.is_of_own_speed else smooth.factor)
     formula = read_formula(whole, is_law=True)
     parameters = [
         LawParameter(name, _unit(force, per, seen.unit, _power(text, name, seen, numbers)))
         if name in COEFFICIENTS else _shape(name, smooth, motion, seen, numbers)
-        for name in sorted(formula.parameters)
+        for name in sorted(formula.parameters) if name not in others
     ]  # fmt: skip
-    gate = '' if smooth.is_of_own_speed else _OF_GATE[smooth.gate]
+    parameters += others.values()
+    gate = '' if smooth.is_of_own_speed else _OF_GATE.get(smooth.gate, smooth.gate)
     words = NEAREST.get(f'{text.removesuffix(" + d")} {gate}'.strip(), NAMELESS)
     price = PER_UNUSUAL + PER_PIECE * _pieces(formula)
     joint = motion.tree.moving_names[smooth.joint]
@@ -242,7 +249,7 @@ def _shape(
     if name == MEMORY:
         assert smooth.variable.memory is not None
         kind, start = smooth.variable.memory
-        unit = 's' if kind == 'lag' else seen.unit
+        unit = seen.unit if kind == 'play' else 's'
         return LawParameter(name, unit, start / 3.0, start=start, high=3.0 * start)
     if name == RATIO:
         assert smooth.variable.other is not None
@@ -259,9 +266,13 @@ def _shape(
 
 
 def _times(plain: str, factor: str) -> str:
-    if not factor:
-        return plain
-    return f'({plain})*{factor}' if ' + ' in plain else f'{plain}*{factor}'
+    """Return a text times a factor; only a sum that no bracket holds needs one."""
+    outside, depth = '', 0
+    for c in plain:
+        depth += (c == '(') - (c == ')')
+        outside += c if not depth else ''
+    whole = f'({plain})' if factor and ' + ' in outside else plain
+    return f'{whole}*{factor}' if factor else whole
 
 
 def _power(text: str, name: str, seen: Range, numbers: Mapping[str, float]) -> float:

@@ -8,7 +8,7 @@ with the bodies and all other effects, as every other model is.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -37,21 +37,24 @@ from sgp_ros.diagnosis.unlisted.shapes import (
     FINE,
     SMOOTHED,
     SmoothForce,
-    Variable,
     beside_each,
     smooth_at_bound,
     smooth_of,
     unlike,
 )
 from sgp_ros.diagnosis.unlisted.tried import (
+    as_factor,
     is_beaten,
     is_series,
     is_wanted,
     leaves_less,
     more_forces,
     smooth_forces,
+    times_law,
     weighted,
+    without_limits,
 )
+from sgp_ros.diagnosis.unlisted.variables import Variable
 from sgp_ros.physics.effect_at import EffectAt
 
 SMOOTH, SHAPES, FIRST, FITTED = 3, 4, 12, 5
@@ -59,6 +62,8 @@ SMOOTH, SHAPES, FIRST, FITTED = 3, 4, 12, 5
 formulas are tried; texts that become formulas for the best one, and for each other."""
 WEIGHT_STEPS = (0.25, 0.12, 0.06, 0.03, 0.015)
 """By which the weight of a joint that is added is refined, in parts of itself."""
+MULTIPLIED = 3
+"""Best models with a formula, whose formula is tried as a factor."""
 EARNED = 3
 """Best models with a formula in which every listed effect must earn its price again."""
 
@@ -78,12 +83,14 @@ def search(
     scale = scale.of_forms()
     look = _Look(columns, scale, listed, joint, is_open)
     smooth = look.ranked()
-    if not smooth or not is_wanted(columns, scale, listed, smooth[0], joint):
+    wanted = is_wanted(columns, scale, listed, smooth[0], joint) if smooth else False
+    if not smooth or not (wanted or is_open):
         return None
     is_better = is_beaten(scale, listed, smooth[0], joint)
     slight = not is_better or is_slight(listed, smooth[0], joint)
     laws: dict[object, Model] = {}
-    for number, model in enumerate(look.shapes(smooth)):
+    # of a product of two variables, one alone may say little
+    for number, model in enumerate(look.shapes(smooth)[: None if wanted else 1]):
         best = max(map(scale.worth, laws.values()), default=-np.inf)
         if scale.worth(model) + look.most_spared(model) < best:
             continue
@@ -91,9 +98,13 @@ def search(
             key = law.key, law.is_free
             if key not in laws or scale.worth(law) > scale.worth(laws[key]):
                 laws[key] = law
-    ranked = sorted(laws.values(), key=lambda m: -scale.worth(m))
+    ranked = look.best(laws.values())
+    if ranked and scale.excess(ranked[0])[joint] > 1.0:
+        products = look.products(ranked)
+        smooth = look.best([*smooth, *products])
+        ranked = look.best([*ranked, *(x for m in products for x in look.formulas(m, FITTED))])
     again = [earned(look.columns, scale, m, joint) for m in ranked[:EARNED]]
-    ranked = sorted([*again, *ranked[EARNED:]], key=lambda m: -scale.worth(m))
+    ranked = without_limits(look.best([*again, *ranked[EARNED:]]), scale, joint)
     first = (i for i, m in enumerate(ranked) if not says_less(columns, m, joint))
     ranked = ranked[next(first, 0) :]
     ranked[:1] = [refined(look.columns, scale, m, joint) for m in ranked[:1]]
@@ -122,16 +133,17 @@ class _Look:
 
         Forces of two joints, or of the past, are kept only if worth more than any plain one.
         """
-        motion = self.columns.equations(frozenset()).motion
-        found = [m for m in self.smooth() if not smooth_at_bound(m, self.joint, motion)]
-        found.sort(key=lambda m: -self.scale.worth(m))
-        found += self.more(found[0]) if found else ()
-        found.sort(key=lambda m: -self.scale.worth(m))
-        found += [self._finer(m, x) for m, x in beside_each(found, self.joint)[:SHAPES]]
-        found.sort(key=lambda m: -self.scale.worth(m))
+        found = self.best(m for m in self.smooth() if not smooth_at_bound(m, self.joint))
+        found = self.best([*found, *self.more(found[0])]) if found else []
+        finer = (self._finer(m, x) for m, x in beside_each(found, self.joint)[:SHAPES])
+        found = self.best([*found, *finer])
         plain = [self.scale.worth(m) for m in found if self._variable(m).is_plain]
         least = max(plain) + ALIKE if plain else -np.inf
         return [m for m in found if self._variable(m).is_plain or self.scale.worth(m) > least]
+
+    def best(self, models: Iterable[Model]) -> list[Model]:
+        """Return models, those that are worth most first."""
+        return sorted(models, key=lambda m: -self.scale.worth(m))
 
     def _variable(self, model: Model) -> Variable:
         return smooth_of(model, self.joint)[1].variable
@@ -158,7 +170,7 @@ class _Look:
         is_left = best.mean_square[self.joint] > CLEARER * floor
         if not (is_left and (self.is_open or is_beaten)):
             return
-        placed, _ = smooth_of(best, self.joint)
+        placed = smooth_of(best, self.joint)[0]
         bases = [tuple(s for s in best.effects if s is not placed), self._others()]
         effects = list(more_forces(self.columns.equations(frozenset()).motion, self.joint))
         for kept in dict.fromkeys(bases):
@@ -167,6 +179,15 @@ class _Look:
             alike = [e for e in effects if e.gate or not any(e.variable.is_of(s) for s in own)]
             for model in list(self._fitted(base, alike, SMOOTH)):
                 yield self._with_weight(base, model)
+
+    def products(self, laws: list[Model]) -> list[Model]:
+        """Return the best model with a smooth force times a formula of another variable."""
+        motion, found = self.columns.equations(frozenset()).motion, list[Model]()
+        for model in laws[:MULTIPLIED]:
+            for factor, others in as_factor(model, self.joint):
+                base = self._without(others, is_free=model.is_free)
+                found += self._fitted(base, [*times_law(motion, self.joint, factor)], 1)
+        return [self._finer(m, smooth_of(m, self.joint)[1]) for m in self.best(found)[:1]]
 
     def _with_weight(self, base: Model, model: Model) -> Model:
         """Return a model with the best weight of a joint that is added in its smooth force."""
@@ -223,9 +244,8 @@ class _Look:
         numbers = law.report(motion)
         if isinstance(law.effect, SmoothForce):
             numbers |= dict(zip(law.effect.shape_names(), law.shape.tolist(), strict=True))
-        knots, name = coarse.variable.knots(motion, FINE), motion.tree.moving_names[self.joint]
-        width = float(numbers.get(SMOOTHED, coarse.width))
-        fine = SmoothForce(self.joint, coarse.variable, coarse.gate, knots, name, width)
+        knots = coarse.variable.knots(motion, FINE)
+        fine = coarse.changed(coarse.variable, knots, float(numbers.get(SMOOTHED, coarse.width)))
         shape = np.array([numbers[n] for n in fine.shape_names()], dtype=np.float64)
         effects = tuple(EffectAt(fine, s.place, shape) if s is law else s for s in model.effects)
         return fit(self.columns, effects, model.sigma, is_free=model.is_free, w=model.w, rounds=2,
@@ -233,8 +253,7 @@ class _Look:
 
     def most_spared(self, smooth: Model) -> float:
         """Return by how much a formula may be worth more than a smooth force, by its price."""
-        placed, _ = smooth_of(smooth, self.joint)
-        return PER_PARAMETER * len(placed.coefficients) + ALIKE
+        return PER_PARAMETER * len(smooth_of(smooth, self.joint)[0].coefficients) + ALIKE
 
     def formulas(self, smooth: Model, count: int) -> Iterator[Model]:
         """Yield models with so many formulas in place of the smooth force of a model."""

@@ -9,35 +9,37 @@ the variable and the factor that explain most.
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from scipy.interpolate import BSpline
 
 from sgp_ros.diagnosis.decide.everyday import LONGEST_LAG
 from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.unlisted.variables import DEGREE, FORCES, MEMORY, Variable
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.law import remembered
+from sgp_ros.physics.formula import read_formula
+from sgp_ros.physics.law import FormulaLaw
 from sgp_ros.physics.motion import SeenMotion, Structure
-from sgp_ros.physics.parts import Place, Placed, Quantity
-from sgp_ros.robots.observed_motion import ObservedMotion
+from sgp_ros.physics.parts import LawParameter, Place, Placed, Quantity, Value
 
 SMOOTHED, SLOWEST = 'v_s', 1e-3
 """Speed of a soft sign: its name, and its least value in parts of the greatest speed."""
 PIECES, FINE = 8, 16
 """Pieces of a spline: of one to be compared at its price, and of one that follows any law."""
-_DEGREE = 3
-MEMORY = 'T'
-"""Parameter of what remembers."""
 LEAST_PLAY, MOST_PLAY = 0.02, 0.9
 """Play that is looked for, in parts of the range that was seen."""
 _LADDER = 7
 """Lags and plays that are tried first."""
-RATIO = 'R'
-"""Parameter of a sum of two joints."""
 GATES = ('', 'sign', 'soft', 'speed', 'square', 'effort')
 """Factors: 1, sign(v), tanh(v/v_s), v, |v| v, motor torque."""
+LAW = 'law'
+"""Factor that is a formula, found before."""
+_NUMBERED = re.compile(r'(?<![\["])\b([xwvnpoue][01]|r|v_s|T|R)\b(?!["\]])')
 MORE_GATES = ('ahead', 'back', 'spin', 'place')
 """Factors that are tried where these leave something: v ahead, v back, v squared, q."""
 _TEXTS = {
@@ -49,106 +51,53 @@ UNITS = {'': '1', 'sign': '1', 'soft': '1', 'speed': '{l}/s', 'square': '{l}2/s2
          'ahead': '{l}/s', 'back': '{l}/s', 'spin': '{l}2/s2', 'place': '{l}'}  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class Variable:
-    """Variable of a force: `q` or `dq` of a joint, of two joints, or an earlier value of it.
+@dataclass(frozen=True, eq=False)
+class LawAsFactor:
+    """A formula of one coefficient that was found, as the factor of another force.
 
     Attributes:
-        kind: `q` or `dq`.
-        index, joint: of the joint, and its name.
-        other: index, name and weight of a joint that is added; None for none.
-        memory: `lag` or `play` with its number [s, or unit of q]; None for none.
+        law: without its coefficient, its parameters renamed; they start from their numbers.
+        variable: that it is a function of.
+        unit: of its coefficient.
     """
 
-    kind: str
-    index: int
-    joint: str
-    other: tuple[int, str, float] | None = None
-    memory: tuple[str, float] | None = None
+    law: FormulaLaw
+    variable: Variable
+    unit: str
+
+    @classmethod
+    def of(cls, law: EffectAt, variable: Variable) -> LawAsFactor | None:
+        """Return a law as a factor; None for one of several coefficients."""
+        effect = law.effect
+        assert isinstance(effect, FormulaLaw)
+        text, found = effect.law.text, zip(effect.shape_names(), law.shape.tolist(), strict=True)
+        if effect.linear != ('a',) or not text.startswith('a*'):
+            return None
+        numbers = effect.known | dict(found)
+        parameters = [
+            replace(p, name=_renamed(p.name), start=numbers[p.name])
+            for p in effect.quantities if isinstance(p, LawParameter) and p.name in numbers
+        ]  # fmt: skip
+        (coefficient,) = effect.coefficient_quantities()
+        formula = read_formula(_renamed(text.removeprefix('a*')), is_law=True)
+        return cls(FormulaLaw(formula, effect.joint, parameters), variable, coefficient.unit)
 
     @property
-    def text(self) -> str:
-        """As it stands in a formula."""
-        if self.memory:
-            return f'{self.memory[0]}({self._signal(self.joint)}, {MEMORY})'
-        if self.other is None:
-            return self._signal(self.joint)
-        _, name, weight = self.other
-        sign, times = ('+', f'{RATIO}*') if self.is_weighted else ('+' if weight > 0 else '-', '')
-        return f'({self._signal(self.joint)} {sign} {times}{self._signal(name)})'
+    def parameters(self) -> tuple[LawParameter, ...]:
+        """Parameters, with their numbers as starts."""
+        return tuple(p for p in self.law.quantities if isinstance(p, LawParameter))
 
-    @property
-    def is_weighted(self) -> bool:
-        """Whether the other joint is added with a weight that is sought."""
-        return self.other is not None and abs(self.other[2]) != 1.0
-
-    def _signal(self, joint: str) -> str:
-        return f'{self.kind}[{joint}]' if joint.isidentifier() else f'{self.kind}["{joint}"]'
-
-    @property
-    def is_plain(self) -> bool:
-        """Whether it is of one joint, now."""
-        return self.other is None and self.memory is None
-
-    def unit(self, tree: Structure) -> str:
-        """Return its unit."""
-        length = 'm' if tree.is_prismatic[self.index] else 'rad'
-        return length if self.kind == 'q' else f'{length}/s'
-
-    def ratio_unit(self, tree: Structure) -> str:
-        """Return the unit of the weight of another joint that is added."""
-        assert self.other is not None
-        lengths = ['m' if tree.is_prismatic[i] else 'rad' for i in (self.index, self.other[0])]
-        return '1' if lengths[0] == lengths[1] else '/'.join(lengths)
-
-    def knots(self, motion: SeenMotion, pieces: int) -> np.ndarray:
-        """Return the knots of a spline over it, (pieces + 7,).
-
-        Half way from even ones to quantiles: the ends of a range are seldom visited, and hold most
-        information. Knots of velocities are denser towards rest, where friction changes.
-        """
-        x = self.values(motion)
-        inner = np.quantile(x, np.linspace(0.0, 1.0, pieces + 1))
-        u = np.linspace(-1.0, 1.0, pieces + 1)
-        if self.kind == 'dq' and x.min() < 0.0 < x.max():
-            inner = u * np.abs(u) * np.where(u < 0.0, -x.min(), x.max())
-        else:
-            inner = 0.5 * (inner + np.linspace(inner[0], inner[-1], pieces + 1))
-        return np.concatenate([np.full(_DEGREE, inner[0]), inner, np.full(_DEGREE, inner[-1])])
-
-    def is_of(self, s: EffectAt) -> bool:
-        """Return whether an effect is a function of it, if it is of the effect's own joint."""
-        over = {'q': 'position', 'dq': 'velocity'}[self.kind]
-        return self.is_plain and s.place.joint == self.index and s.effect.drawn_over == over
-
-    @property
-    def words(self) -> str:
-        """As it stands in a sentence."""
-        what = 'position' if self.kind == 'q' else 'velocity'
-        if self.memory:
-            return f'{what} of {self.joint} after a {self.memory[0]}'
-        if self.other is None:
-            return f'{what} of {self.joint}'
-        _, other, weight = self.other
-        if self.is_weighted:
-            return f'{what} of {self.joint} plus {weight:.2g} times that of {other}'
-        return f'{"sum" if weight > 0 else "difference"} of the {what} of {self.joint} and {other}'
-
-    def values(self, motion: SeenMotion) -> np.ndarray:
-        """Return it in a motion, (n,)."""
-        of = motion.position if self.kind == 'q' else motion.velocity
-        x = np.asarray(of[:, self.index])
-        if self.memory:
-            name, number = self.memory
-            return remembered(name, motion, x, number)
-        return x if self.other is None else x + self.other[2] * of[:, self.other[0]]
+    def values(
+        self, motion: SeenMotion, numbers: Mapping[str, Value] = MappingProxyType({})
+    ) -> np.ndarray:
+        """Return it in a motion, (n,), with other numbers where some are given."""
+        own = {p.name: float(numbers.get(p.name, p.start)) for p in self.parameters}
+        shape = np.array([own[name] for name in self.law.shape_names()])
+        return np.asarray(self.law.columns(motion, self.law.places(motion)[0], shape)[:, 0])
 
 
-def force_unit(gate: str, *, is_prismatic: bool) -> str:
-    """Return the unit of f on a joint, such that with its factor it is a force."""
-    length, force = ('m', 'N') if is_prismatic else ('rad', 'N m')
-    per = UNITS[gate].format(l=length, f=force)
-    return '1' if gate == 'effort' else force if per == '1' else f'{force}/({per})'
+def _renamed(text: str) -> str:
+    return _NUMBERED.sub(r'\g<1>_f', text)
 
 
 class SmoothForce(Effect):
@@ -161,6 +110,8 @@ class SmoothForce(Effect):
         knots: of the spline, (pieces + 7,).
         name: of the joint.
         width: speed over which the factor `sign` changes [rad/s or m/s]; 0 for a jump.
+        factor_of: index and name of the joint whose motion the factor is; None for this one.
+        known: law that is the factor, where the gate is `law`.
     """
 
     name = 'smooth_force'
@@ -169,16 +120,18 @@ class SmoothForce(Effect):
 
     def __init__(
         self, joint: int, variable: Variable, gate: str, knots: np.ndarray, name: str,
-        width: float = 0.0,
+        width: float = 0.0, factor_of: tuple[int, str] | None = None,
+        known: LawAsFactor | None = None,
     ) -> None:  # fmt: skip
         self.joint, self.variable, self.gate, self.knots = joint, variable, gate, knots
         self.width, self.joint_name, self.is_dry = width, name, gate == 'sign'
-        own = Variable('dq', joint, name)
-        effort, place = (own.text.replace('dq[', f'{kind}[', 1) for kind in ('tau', 'q'))
-        self.is_of_own_speed = variable == own
-        self.factor = _TEXTS[gate].format(v=own.text, u=effort, q=place)
+        self.factor_of, self.known_factor = factor_of or (joint, name), known
+        v, u, q = (Variable(kind, *self.factor_of).text for kind in ('dq', 'tau', 'q'))
+        self.is_of_own_speed = variable == Variable('dq', joint, name) and known is None
+        self.factor = _TEXTS[gate].format(v=v, u=u, q=q) if known is None else known.law.law.text
+        self.is_dry = self.is_dry or (known is not None and known.law.is_dry)
         self.formula = f'tau_x = f({variable.text}){"*" if gate else ""}{self.factor}'
-        count = len(knots) - _DEGREE - 1
+        count = len(knots) - DEGREE - 1
         self.linear = tuple(f'c{i}' for i in range(count))
         self.quantities = tuple(Quantity(name, 'N m') for name in self.linear)
 
@@ -209,7 +162,7 @@ class SmoothForce(Effect):
             return np.zeros(0), np.zeros(0)
         kind, least = self.variable.memory
         lag = LONGEST_LAG * motion.step * len(motion.position)
-        most = lag if kind == 'lag' else MOST_PLAY / LEAST_PLAY * least
+        most = MOST_PLAY / LEAST_PLAY * least if kind == 'play' else lag
         return np.array([least]), np.array([max(most, 2.0 * least)])
 
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
@@ -228,7 +181,27 @@ class SmoothForce(Effect):
             width = float(shape[0])
         elif own.memory is not None:
             own = replace(own, memory=(own.memory[0], float(shape[0])))
-        return SmoothForce(self.joint, own, self.gate, self.knots, self.joint_name, width)
+        return self.changed(own, self.knots, width)
+
+    def changed(self, variable: Variable, knots: np.ndarray, width: float) -> SmoothForce:
+        """Return the same with another variable, knots and width."""
+        return SmoothForce(
+            self.joint, variable, self.gate, knots, self.joint_name, width, self.factor_of,
+            self.known_factor,
+        )  # fmt: skip
+
+    def factor_unit(self, tree: Structure) -> str:
+        """Return the unit of the factor."""
+        length = 'm' if tree.is_prismatic[self.factor_of[0]] else 'rad'
+        return UNITS[self.gate].format(l=length, f=FORCES[length])
+
+    def force_unit(self, tree: Structure) -> str:
+        """Return the unit of f, such that with its factor it is a force."""
+        if self.known_factor is not None:
+            return self.known_factor.unit
+        force = FORCES['m' if tree.is_prismatic[self.joint] else 'rad']
+        per = self.factor_unit(tree)
+        return '1' if per == force else force if per == '1' else f'{force}/({per})'
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         """Return the pieces of the spline times the factor, (n, m)."""
@@ -238,21 +211,24 @@ class SmoothForce(Effect):
     def basis(self, x: np.ndarray) -> np.ndarray:
         """Return the pieces of the spline at x (n,), (n, m); constant beyond what was seen."""
         inside = np.clip(x, self.knots[0], self.knots[-1])
-        found = BSpline.design_matrix(inside, self.knots, _DEGREE)
+        found = BSpline.design_matrix(inside, self.knots, DEGREE)
         return np.asarray(found.toarray())
 
     def factors(self, motion: SeenMotion) -> np.ndarray:
         """Return the factor g, (n,)."""
-        v = motion.velocity[:, self.joint]
+        if self.known_factor is not None:
+            return self.known_factor.values(motion)
+        joint = self.factor_of[0]
+        v = motion.velocity[:, joint]
         if self.gate in {'sign', 'soft'} and self.width > 0.0:
             return np.tanh(v / self.width)
         if self.gate == 'sign':
-            return np.asarray(motion.direction[:, self.joint])
+            return np.asarray(motion.direction[:, joint])
         if self.gate == 'effort':
-            return np.asarray(motion.effort[:, self.joint])
+            return np.asarray(motion.effort[:, joint])
         return np.asarray({
             '': np.ones(len(v)), 'speed': v, 'square': np.abs(v) * v, 'ahead': np.maximum(v, 0.0),
-            'back': np.minimum(v, 0.0), 'spin': v**2, 'place': motion.position[:, self.joint],
+            'back': np.minimum(v, 0.0), 'spin': v**2, 'place': motion.position[:, joint],
         }[self.gate])  # fmt: skip
 
 
@@ -264,10 +240,10 @@ def smooth_of(model: Model, joint: int) -> tuple[EffectAt, SmoothForce]:
     )  # fmt: skip
 
 
-def smooth_at_bound(model: Model, joint: int, motion: ObservedMotion) -> bool:
+def smooth_at_bound(model: Model, joint: int) -> bool:
     """Return whether a memory is at either bound of its search."""
     placed, _ = smooth_of(model, joint)
-    low, high = placed.effect.bounds(motion, placed.place)
+    low, high = placed.effect.bounds(model.frame.equations.motion, placed.place)
     has_memory = placed.effect.shape_names() == (MEMORY,)
     return bool(has_memory and ((placed.shape < 1.02 * low) | (placed.shape > 0.98 * high)).any())
 
@@ -278,7 +254,7 @@ def unlike(smooth: list[Model], joint: int) -> list[Model]:
     for model in smooth:
         placed, force = smooth_of(model, joint)
         gate = '' if force.is_of_own_speed else force.gate
-        key = force.variable, gate, model.key - {placed.key}, model.is_free
+        key = force.variable, gate and force.factor, model.key - {placed.key}, model.is_free
         found.setdefault(key, model)
     return list(found.values())
 

@@ -17,8 +17,10 @@ from sgp_ros.diagnosis.unlisted.assertion import Explained, with_laws
 from sgp_ros.diagnosis.unlisted.beside import law_of
 from sgp_ros.diagnosis.unlisted.formulas import FoundLaw
 from sgp_ros.diagnosis.unlisted.searched import Searched
-from sgp_ros.diagnosis.unlisted.shapes import SmoothForce, force_unit, smooth_of
+from sgp_ros.diagnosis.unlisted.shapes import SmoothForce, smooth_of
+from sgp_ros.diagnosis.unlisted.variables import SLIP
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.formula import Formula
 from sgp_ros.physics.grammar import MEMORY
 
 POINTS = 41
@@ -114,10 +116,10 @@ def _curve(law: EffectAt, searched: Searched, seen: Seen) -> np.ndarray:
     assert isinstance(law.effect, FoundLaw)
     own = law.effect.smooth
     is_speed = smooth.is_of_own_speed
-    if own.variable != smooth.variable or not (is_speed or own.gate == smooth.gate):
+    if own.variable != smooth.variable or not (is_speed or own.factor == smooth.factor):
         return np.full(len(seen.x), np.nan)
-    motion = searched.smooth.frame.equations.motion
-    g = smooth.factors(motion)
+    motion, known = searched.smooth.frame.equations.motion, own.known_factor
+    g = smooth.factors(motion) if known is None else known.values(motion, law.report(motion))
     force, g = law.force(motion)[seen.rows, searched.joint], g[seen.rows]
     return np.divide(
         force, g, out=np.full(len(g), np.nan), where=np.abs(g) > _WEAK * np.abs(g).max()
@@ -128,13 +130,17 @@ def _beyond(law: EffectAt, searched: Searched, x: np.ndarray) -> np.ndarray:
     """Return a formula over its factor at places of its variable (b,); NaN if of other kind.
 
     A sign is that of a fast motion ahead, a factor that is a speed or an effort is one; signals
-    with memory have settled.
+    with memory have settled, and what a joint is ahead of its lag is what it is ahead of zero. A
+    formula that is the factor is left out.
     """
     _, smooth = smooth_of(searched.smooth, searched.joint)
     assert isinstance(law.effect, FoundLaw)
     own, numbers = law.effect.smooth, law.report(searched.smooth.frame.equations.motion)
     gate = '' if own.is_of_own_speed else own.gate
-    if own.variable != smooth.variable or gate != ('' if smooth.is_of_own_speed else smooth.gate):
+    shown = '' if own.is_of_own_speed else own.factor
+    if own.variable != smooth.variable or shown != (
+        '' if smooth.is_of_own_speed else smooth.factor
+    ):
         return np.full(len(x), np.nan)
     variable = own.variable
     factor = np.inf if gate in {'sign', 'soft'} else 1.0
@@ -145,12 +151,19 @@ def _beyond(law: EffectAt, searched: Searched, x: np.ndarray) -> np.ndarray:
         is_other = variable.other is not None and joint == variable.other[1]
         return lambda _at: np.full(len(x), 0.0 if is_other else factor)
 
-    force: Callable[[object], object] = law.effect.law.compiled(
-        lambda name: lambda _at: float(numbers[name]), signal,
-        lambda name, _signals: (lambda _at, value, _number: value) if name in MEMORY else None,
-    )  # fmt: skip
+    is_slip = variable.memory is not None and variable.memory[0] == SLIP
+
+    def force(formula: Formula) -> np.ndarray:
+        value: Callable[[object], object] = formula.compiled(
+            lambda name: lambda _at: float(numbers[name]), signal,
+            lambda name, _: (lambda _at, now, _number: 0.0 * now if is_slip else now)
+            if name in MEMORY else None,
+        )  # fmt: skip
+        return np.broadcast_to(np.asarray(value(None), dtype=np.float64), (len(x),))
+
     with np.errstate(all='ignore'):
-        found = np.broadcast_to(np.asarray(force(None), dtype=np.float64), (len(x),))
+        found = force(law.effect.law)
+        found = found / (force(own.known_factor.law.law) if own.known_factor else 1.0)
     side = np.sign(x) if smooth.is_of_own_speed and smooth.gate == 'sign' else 1.0
     return np.where(np.isfinite(found), found * side, np.nan)
 
@@ -163,9 +176,8 @@ def _search(found: Explained, searched: Searched) -> LawSearch:
     beyond = np.linspace(shape.x[0] - reach, shape.x[-1] + reach, 2 * POINTS)
     scale = Scale.of(searched.smooth.frame.equations, found.comparison)
     tree = motion.tree
-    prismatic = bool(tree.is_prismatic[searched.joint])
     unit = smooth.variable.unit(tree)
-    per = force_unit(smooth.gate, is_prismatic=prismatic)
+    per = smooth.force_unit(tree)
     power = searched.smooth.frame.equations.power[searched.joint]
 
     def left(model: Model) -> float:

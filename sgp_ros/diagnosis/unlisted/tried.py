@@ -18,16 +18,20 @@ from sgp_ros.diagnosis.unlisted.beside import (
     is_bent,
     is_creep,
     is_slight,
+    law_of,
     own_effects,
 )
+from sgp_ros.diagnosis.unlisted.formulas import FoundLaw
 from sgp_ros.diagnosis.unlisted.shapes import (
     GATES,
+    LAW,
     LEAST_PLAY,
     MORE_GATES,
     PIECES,
+    LawAsFactor,
     SmoothForce,
-    Variable,
 )
+from sgp_ros.diagnosis.unlisted.variables import SLIP, Variable
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.robots.observed_motion import ObservedMotion
 
@@ -122,8 +126,9 @@ def is_series(effects: Sequence[EffectAt], motion: ObservedMotion) -> bool:
 def more_forces(motion: ObservedMotion, joint: int) -> Iterator[SmoothForce]:
     """Yield those that are tried where all of these leave something.
 
-    With a factor that acts one way, is the joint's squared speed, or its own position; and of the
-    joint's motion plus a part of another's, as a tendon or a hose over both sees it.
+    With a factor that acts one way, is the joint's squared speed, its own position, or the speed
+    of another joint, as a gyro sees it; of the joint's motion plus a part of another's, as a
+    tendon or a hose over both sees it; of a motor's torque; and of the past in other ways.
     """
     names, own = motion.tree.moving_names, {'q': motion.position, 'dq': motion.velocity}
     for i, kind in itertools.product(motion.moving_joints, own):
@@ -137,6 +142,13 @@ def more_forces(motion: ObservedMotion, joint: int) -> Iterator[SmoothForce]:
             for weight, sign in itertools.product(size * _WEIGHTS, (1.0, -1.0)):
                 for gate in ('', 'sign') if kind == 'q' else ('',):
                     yield weighted(motion, joint, i, kind, sign * float(weight), gate)
+            if kind == 'q':
+                for variable in (Variable('q', joint, names[joint]), Variable('q', i, names[i])):
+                    knots = variable.knots(motion, PIECES)
+                    yield SmoothForce(joint, variable, 'speed', knots, names[joint],
+                                      factor_of=(i, names[i]))  # fmt: skip
+    for variable in _further(motion, joint):
+        yield SmoothForce(joint, variable, '', variable.knots(motion, PIECES), names[joint])
 
 
 def weighted(
@@ -162,3 +174,50 @@ def _remembering(motion: ObservedMotion, joint: int) -> Iterator[Variable]:
     for kind in ('q', 'dq'):
         yield Variable(kind, joint, name, memory=('lag', SHORTEST_LAG * motion.step))
     yield Variable('q', joint, name, memory=('play', LEAST_PLAY * width))
+
+
+def _further(motion: ObservedMotion, joint: int) -> Iterator[Variable]:
+    """Yield motor torques that are commands, delays of the joint's motion, and its slip."""
+    names, least = motion.tree.moving_names, SHORTEST_LAG * motion.step
+    for i in np.flatnonzero(motion.is_commanded & motion.moves):
+        yield Variable('tau', int(i), names[int(i)])
+    for kind, memory in itertools.product(('q', 'dq'), ('delay', SLIP)):
+        yield Variable(kind, joint, names[joint], memory=(memory, least))
+
+
+def without_limits(ranked: Sequence[Model], scale: Scale, joint: int) -> list[Model]:
+    """Return models with a formula without those of which one is only a limit.
+
+    With a parameter at the end of its range a formula is nearly another, shorter one. It stays
+    where it is worth more than every other, by more than a recording shows.
+    """
+
+    def is_limit(model: Model) -> bool:
+        law = law_of(model, joint)
+        return law is not None and bool(law.at_bounds(model.frame.equations.motion))
+
+    inside = [scale.worth(m) for m in ranked if not is_limit(m)]
+    most = max(inside, default=-np.inf) + ALIKE
+    return [m for m in ranked if scale.worth(m) > most or not is_limit(m)]
+
+
+def as_factor(
+    model: Model, joint: int
+) -> Iterator[tuple[LawAsFactor, tuple[EffectAt, ...]]]:  # fmt: skip
+    """Yield the formula of a model at a joint as a factor, if it can be one, and all others."""
+    law = law_of(model, joint)
+    assert law is not None
+    assert isinstance(law.effect, FoundLaw)
+    factor = LawAsFactor.of(law, law.effect.smooth.variable)
+    if factor is not None:
+        yield factor, tuple(s for s in model.effects if s is not law)
+
+
+def times_law(motion: ObservedMotion, joint: int, factor: LawAsFactor) -> Iterator[SmoothForce]:
+    """Yield smooth forces of one variable times a formula of another."""
+    names = motion.tree.moving_names
+    for i, kind in itertools.product(motion.moving_joints, ('q', 'dq')):
+        variable = Variable(kind, i, names[i])
+        if variable != factor.variable:
+            knots = variable.knots(motion, PIECES)
+            yield SmoothForce(joint, variable, LAW, knots, names[joint], known=factor)

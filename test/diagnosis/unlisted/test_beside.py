@@ -14,8 +14,9 @@ from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import compare_models
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.unlisted.beside import acts_as_bodies, is_bent, is_creep, is_slight
-from sgp_ros.diagnosis.unlisted.shapes import FINE, SmoothForce, Variable
+from sgp_ros.diagnosis.unlisted.shapes import FINE, SmoothForce
 from sgp_ros.diagnosis.unlisted.tried import smooth_forces
+from sgp_ros.diagnosis.unlisted.variables import Variable
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
 from test.diagnosis.fitted_models import fitted

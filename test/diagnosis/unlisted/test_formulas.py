@@ -68,6 +68,14 @@ def _cable(_t, q, _s):
     return 0.3 * math.exp(0.6 * q[0])
 
 
+def _jet(_t, _q, v):
+    return (0.4 * max(1.3 - v[0], 0.0) ** 2,)
+
+
+def _shield(_t, q, v):
+    return (-6.0 * math.sin(2.5 * q[0] + 0.4) / (1.0 + (v[0] / 1.4) ** 2), 0.0)
+
+
 def _found(equations_for, links, **what):
     _, equations = equations_for(simulate(CHAINS[links], 11, 10.0, **what))
     comparison = compare_models(equations, lambda _share: None)
@@ -93,6 +101,14 @@ def _found(equations_for, links, **what):
             {'a': -0.8, 'x0': 0.1, 'd': -0.8}, marks=pytest.mark.long,
         ),
         pytest.param(
+            _jet, 1, 'a*max(x0 - dq[joint0], 0)**2', {'a': 0.4, 'x0': 1.3},
+            marks=pytest.mark.long,
+        ),
+        pytest.param(
+            _shield, 2, 'a*1/(1 + ((dq[joint0] - x0)/w0)**2)*sin(n0_f*(q[joint0] - x0_f))',
+            {'w0': 1.4, 'n0_f': 2.5}, marks=pytest.mark.long,
+        ),
+        pytest.param(
             _contact, 1, 'a*(max(q[joint0] - x0, 0)/r)**p0', {'p0': 1.5, 'x0': 0.3},
             marks=pytest.mark.long,
         ),
@@ -116,8 +132,8 @@ def _found(equations_for, links, **what):
             marks=pytest.mark.long,
         ),
     ],
-    ids=['log friction', 'brake and friction', 'valve', 'contact', 'play', 'spring between',
-         'hose', 'cushion', 'unbalanced'],
+    ids=['log friction', 'brake and friction', 'valve', 'jet', 'shield', 'contact', 'play',
+         'spring between', 'hose', 'cushion', 'unbalanced'],
 )  # fmt: skip
 def test_laws_are_found_with_their_numbers(equations_for, force, links, formula, numbers):
     """Of one joint, of what it did before, of two joints; alone and in a sum."""
