@@ -189,11 +189,12 @@ def probabilities(
 ) -> Probabilities:
     """Return the tempered probabilities of all effects.
 
-    A richer law whose numbers reduce it to the asserted one is not a rival; bodies that do what an
-    asserted law does, on any motion, are one. An effect is only as certain as its joint is well
-    described; one that acts on all joints, as the worst of them; a gain, whose measure are bodies
-    that may differ, as the worst joint, known or not, for bodies take up what is not known there.
-    Unlikely numbers are doubted.
+    A richer law whose numbers reduce it to the asserted one is not a rival, nor a longer
+    formula that fits no better; bodies that do what an asserted law does, on any motion, are
+    one. An effect is only as certain as its joint is well described; one that acts on all
+    joints, as the worst of them; a gain, whose measure are bodies that may differ, as the
+    worst joint, known or not, for bodies take up what is not known there. Unlikely numbers are
+    doubted.
     """
     scale, asserted = Scale.of(equations, comparison), decision.model
     if any(s.effect.has_chosen_form for s in asserted.effects):
@@ -203,7 +204,7 @@ def probabilities(
     models = [
         m
         for m in known
-        if scale.counts(m)
+        if (scale.counts(m) and not contrasts.is_longer(m, scale))
         and not (
             m.key != asserted.key
             and not _has_bodies_for(m, asserted)

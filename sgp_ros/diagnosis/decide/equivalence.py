@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations, joint_name
-from sgp_ros.diagnosis.criteria import ADEQUATE_REST, ALIKE, CLEARER, LEAST_SHARE
+from sgp_ros.diagnosis.criteria import ADEQUATE_REST, ALIKE, CLEARER, LEAST_SHARE, PER_PARAMETER
 from sgp_ros.diagnosis.decide.decision import Decision
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.comparison import Comparison
@@ -73,6 +73,19 @@ class Contrasts:
         So does a law with one parameter more whose value makes it the simpler one.
         """
         return max(self.of(rival).values()) < LEAST_SHARE
+
+    def is_longer(self, rival: Model, scale: Scale) -> bool:
+        """Return whether a rival is a formula of more numbers that fits no better.
+
+        Every formula has such ones, which differ from it where nothing was seen.
+        """
+        found = self._asserted
+        own, others = (
+            {s.key for s in m.effects if not s.effect.has_chosen_form} for m in (found, rival)
+        )
+        is_alike = own == others and len(own) < len(found.effects) == len(rival.effects)
+        gains = scale.fit(rival) - scale.fit(found)
+        return is_alike and rival.size > found.size and gains < 0.5 * PER_PARAMETER
 
     def stands_for(self, rival: Model, effect: EffectAt) -> bool:
         """Return whether an effect of a rival is an asserted one under another name.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -64,6 +65,24 @@ def test_the_diagnosis_says_what_it_cannot_tell(robots):
     named = {f.effect for f in found.findings} or {'bodies'}
     others = {effect for e in found.equivalents for _, effect in e.effects or (('', 'bodies'),)}
     assert named | others >= {'spring', 'bodies'}
+
+
+@pytest.mark.parametrize(
+    ('size', 'fit', 'beside', 'is_longer'),
+    [(3, 0.0, 'friction', True), (2, 0.0, 'friction', False), (3, 2.0, 'friction', False),
+     (3, 0.0, 'spring', False)],
+)  # fmt: skip
+def test_a_longer_formula_that_fits_no_better_is_no_rival(size, fit, beside, is_longer):
+    """Unless it has as few numbers, explains more, or stands beside something else."""
+
+    def model(size, fit, beside):
+        laws = [(key, SimpleNamespace(has_chosen_form=key == 'law')) for key in ('law', beside)]
+        effects = tuple(SimpleNamespace(key=key, effect=effect) for key, effect in laws)
+        return SimpleNamespace(size=size, fit=fit, effects=effects)
+
+    scale = SimpleNamespace(fit=lambda model: model.fit)
+    contrasts = Contrasts(None, model(2, 0.0, 'friction'))
+    assert contrasts.is_longer(model(size, fit, beside), scale) is is_longer
 
 
 def test_nothing_is_equivalent_to_what_is_unexplained(narrow):
