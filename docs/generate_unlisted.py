@@ -13,6 +13,7 @@ from sgp_proof.concealed.unlisted import SAME
 ROOT = Path(__file__).parents[1]
 TARGET = Path(__file__).parent / 'unlisted.md'
 RESULTS = ROOT / 'sgp_proof/results/unlisted_sixth.json'
+SIXTH_AGAIN = ROOT / 'sgp_proof/results/unlisted_sixth_again.json'
 FIFTH = ROOT / 'sgp_proof/results/unlisted_fifth.json'
 FOURTH = ROOT / 'sgp_proof/results/unlisted_fourth.json'
 THIRD = ROOT / 'sgp_proof/results/unlisted_third.json'
@@ -35,7 +36,8 @@ def text():
     result = json.loads(RESULTS.read_text(encoding='utf-8'))
     rows, summary = result['cases'], result['summary']
     earlier = {'first': FIRST, 'third': THIRD, 'again': AGAIN, 'fourth': FOURTH,
-               'fourth_again': FOURTH_AGAIN, 'fifth': FIFTH, 'fifth_again': FIFTH_AGAIN}  # fmt: skip
+               'fourth_again': FOURTH_AGAIN, 'fifth': FIFTH, 'fifth_again': FIFTH_AGAIN,
+               'sixth_again': SIXTH_AGAIN}  # fmt: skip
     known = {f'{name}_{key}': value for name, path in earlier.items()
              for key, value in _rates(path).items()}  # fmt: skip
     numbers = sorted(int(r['case'].rpartition('_')[2]) for r in rows)
