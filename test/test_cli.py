@@ -83,7 +83,9 @@ def test_left_out_effects_reach_the_recording_and_the_truth(tmp_path):
     assert any(e.get('effect', e.get('name')) == 'coulomb_friction' for e in truth['effects'])
 
 
-@pytest.mark.parametrize('robot', ['toy_pendulum', 'linear_axis'])
+@pytest.mark.parametrize(
+    'robot', ['toy_pendulum', pytest.param('linear_axis', marks=pytest.mark.long)]
+)
 def test_every_simulated_robot_replays(robot, tmp_path):
     """Simulate, then identify with the robot of the same name."""
     assert main(['simulate', robot, '--duration', '15', '--out', str(tmp_path)]) == 0

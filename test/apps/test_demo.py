@@ -145,9 +145,8 @@ def test_an_interruption_while_a_process_starts_comes_after_it(monkeypatch, tmp_
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize(
-    'number', [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)]
-)
+@pytest.mark.long
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_demonstration_leaves_no_process(number, tmp_path):
     """Both nodes run when the signal comes; all three are gone after it."""
     code = 'import signal; signal.signal(signal.SIGINT, signal.default_int_handler); '

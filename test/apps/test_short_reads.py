@@ -39,7 +39,10 @@ def short(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize('command', RESULTS)
+@pytest.mark.parametrize(
+    'command',
+    [pytest.param(x, marks=pytest.mark.long) if x == 'campaign' else x for x in RESULTS],
+)
 def test_a_short_read_is_said_wherever_results_are(command, short, tmp_path, capsys):
     words = [command, str(short / 'x.mcap'), '--robot', str(short / 'axis.urdf')]
     words += ['--task', 'identify', '--workers', '1'] if command == 'campaign' else []

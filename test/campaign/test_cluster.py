@@ -87,6 +87,7 @@ def test_what_is_finished_is_not_computed_again(bags, client, finished, monkeypa
     assert (finished / 'results.parquet').read_bytes() == before
 
 
+@pytest.mark.long
 def test_a_killed_campaign_goes_on_to_the_same_table(bags, client, finished, tmp_path):
     """SIGKILL after the first result; the rest is computed by the next run."""
     out = tmp_path / 'out'

@@ -138,6 +138,7 @@ def test_a_torque_constant_differs_once_a_motor_was_replaced(found):
     assert gain.probability > 0.5
 
 
+@pytest.mark.long
 def test_much_that_differs_at_once_is_told_apart(found):
     """Load and friction, each of which is told as a torque constant while others are not there."""
     one = found('much')

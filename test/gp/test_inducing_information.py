@@ -142,8 +142,11 @@ def test_where_each_sample_has_a_feature_the_process_is_kept_too():
 @pytest.mark.parametrize('way', WAYS)
 @pytest.mark.parametrize(
     ('length', 'variance', 'noise'),
-    [(1.5, 1.0, 1.0), (0.75, 1.0, 1.0), (1.0, 3.0, 1.0), (1.0, 0.3, 2.0), (1.2, 2.0, 0.5)],
-)
+    [(1.5, 1.0, 1.0), (1.0, 0.3, 2.0), *(
+        pytest.param(*x, marks=pytest.mark.long)
+        for x in [(0.75, 1.0, 1.0), (1.0, 3.0, 1.0), (1.2, 2.0, 0.5)]
+    )],
+)  # fmt: skip
 def test_the_stream_is_as_good_as_learned_anew(way, length, variance, noise):
     """W is within a quarter of a deviation, its deviations within a tenth of a fresh start's.
 

@@ -18,7 +18,9 @@ from test.ros.test_node import QUICK
 pytestmark = pytest.mark.ros
 
 
-@pytest.mark.parametrize('seed', [1, 3, 4, 8])
+@pytest.mark.parametrize(
+    'seed', [1, 4, *(pytest.param(i, marks=pytest.mark.long) for i in (3, 8))]
+)
 def test_messages_of_all_kinds_are_used_or_counted(
     context: int, tmp_path: Path, seed: int
 ) -> None:

@@ -85,6 +85,7 @@ def drawn(tmp_path_factory):
     return draw_once
 
 
+@pytest.mark.long
 def test_drawn_case_has_the_layout_and_the_size_that_was_promised(drawn):
     """Recordings, URDF, answers and true accelerations of one world."""
     tmp_path = drawn('viscous_friction')

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 
+import pytest
+
 from sgp_proof.concealed.swings import DRAG, KINDS, drawn
 from sgp_proof.result_files import RESULTS
 
 
+@pytest.mark.long
 def test_drag_of_a_drawn_pendulum_is_named():
     world = drawn(KINDS.index(DRAG) + 2 * len(KINDS))
     assert world['is_right']

@@ -232,7 +232,7 @@ def test_rows_and_cells_of_every_table_are_counted(samples, monkeypatch, kind, b
     _refused_then_read(monkeypatch, bound, values, lambda: load_columns(samples[kind], []))
 
 
-@pytest.mark.parametrize('ending', ['.csv', '.npz', '.json'])
+@pytest.mark.parametrize('ending', ['.npz', '.json', pytest.param('.csv', marks=pytest.mark.long)])
 def test_a_large_table_is_read_in_bounded_memory(tmp_path, ending):
     """A process whose data may take 500 MB; the text of the cells alone would take more."""
     path = tmp_path / f'x{ending}'
