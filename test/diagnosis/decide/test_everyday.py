@@ -96,10 +96,10 @@ class _Stirred:
     def __call__(self, t, _q, v):
         self.fluid += (v[0] - self.fluid) * min((t - self.t) / self.follow_s, 1.0)
         self.t = t
-        return (-0.6 * abs(v[0] - self.fluid) * (v[0] - self.fluid),)
+        return (-0.6 * (v[0] - self.fluid),)
 
 
-@pytest.mark.parametrize('follow_s', [0.4, 0.9])
+@pytest.mark.parametrize('follow_s', [0.2, 1.0])
 def test_drag_in_a_fluid_that_follows_is_no_friction_beside_it(equations_for, follow_s):
     """It resists the motion as friction does, and earlier speeds say how much."""
     found = _decided(equations_for, force=_Stirred(follow_s))[2]
