@@ -190,11 +190,13 @@ def foreseen(plain: Connected, correction: Correction, tree: Tree) -> Connected:
     """
     recordings = plain.recordings.corrected(correction)
     equations = equations_of(recordings, correction.tree(tree))(recordings.learned)
-    of = plain.several.model
-    model = fit(Columns(equations), of.effects, first_scale(equations), is_free=of.is_free)
+    columns, left, of = Columns(equations), equations, plain.several.model
+    model = fit(columns, of.effects, first_scale(equations), is_free=of.is_free)
     own = own_laws(model.effects)
-    left = replace(equations, d=equations.d - force_of(model, own)) if own else equations
-    columns, start = Columns(left), first_scale(left)
+    if own:
+        left = replace(equations, d=equations.d - force_of(model, own))
+        columns = Columns(left)
+    start = first_scale(left)
     bases = [fit(columns, (), start, is_free=is_free) for is_free in (False, True)]
     comparison, common = Comparison(bases[0], bases[1], (), ()), plain.several.decision.model
     tried = [fit(columns, common.effects, model.sigma, is_free=m.is_free, w=m.w) for m in bases]
