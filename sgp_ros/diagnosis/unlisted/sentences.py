@@ -106,7 +106,7 @@ def of_velocity(*, is_own: bool) -> Iterator[str]:
 
 def sums(term: str, *, is_position: bool) -> Iterator[str]:
     """Yield texts of a term, such as `a*X**2`, and a second one."""
-    for other in OF_POSITION if is_position else (*PLACED, *OF_VELOCITY):
+    for other in OF_POSITION if is_position else dict.fromkeys((*PLACED, *OF_VELOCITY)):
         if 'a*' not in other and other != term.removeprefix('a*'):
             yield f'{term} + b*{_second(other)}'
 
