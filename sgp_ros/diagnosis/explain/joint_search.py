@@ -60,7 +60,8 @@ def by_joint(columns: Columns, model: Model) -> list[Model]:
             asked = block.joints, trace(model)
             if asked not in columns.settled:
                 found = _shrunk(columns, grown(columns, model, block), block)
-                columns.settled.update([asked] if found is model else [])
+                if found is model:
+                    columns.settled.add(asked)
                 model = found
         if model.key == before:
             if trace(model) in columns.settled:

@@ -83,8 +83,10 @@ def search(
     scale = scale.of_forms()
     look = _Look(columns, scale, listed, joint, is_open)
     smooth = look.ranked()
-    wanted = is_wanted(columns, scale, listed, smooth[0], joint) if smooth else False
-    if not smooth or not (wanted or is_open):
+    if not smooth:
+        return None
+    wanted = is_wanted(columns, scale, listed, smooth[0], joint)
+    if not (wanted or is_open):
         return None
     is_better = is_beaten(scale, listed, smooth[0], joint)
     slight = not is_better or is_slight(listed, smooth[0], joint)
