@@ -33,16 +33,31 @@ def _wave(size, damping=DAMPING):
     return lambda t, q, v: (size * math.sin(7.0 * q[0]) * math.sin(1.3 * t) - damping * v[0],)
 
 
-class _Cushion:
+class _Lag:
+    """A position or speed that something follows, and forgets."""
+
+    def __init__(self, lag_s):
+        self.lag_s, self.z, self.t = lag_s, 0.0, 0.0
+
+    def ahead(self, t, x):
+        """Return by how much x is ahead of it."""
+        self.z += (x - self.z) * min((t - self.t) / self.lag_s, 1.0)
+        self.t = t
+        return x - self.z
+
+
+class _Cushion(_Lag):
     """A cushion of air that leaks: it pushes back, and forgets; of no law of the list."""
 
-    def __init__(self, leak_s):
-        self.leak_s, self.z, self.t = leak_s, 0.0, 0.0
+    def __call__(self, t, q, _v):
+        return (1.0 - max(1.0 - 0.6 * self.ahead(t, q[0]), 0.1) ** -1.4,)
 
-    def __call__(self, t, q, v):
-        self.z += (q[0] - self.z) * min((t - self.t) / self.leak_s, 1.0)
-        self.t = t
-        return (1.0 - max(1.0 - 0.6 * (q[0] - self.z), 0.1) ** -1.4,)
+
+class _Stirred(_Lag):
+    """Drag in a fluid that follows."""
+
+    def __call__(self, t, _q, v):
+        return (-0.6 * self.ahead(t, v[0]),)
 
 
 def _unexplained(equations):
@@ -85,18 +100,6 @@ def test_what_leaks_has_no_friction_beside_it(equations_for, leak_s):
     """It takes energy as friction does, which leans on a rest that is larger than itself."""
     found = _decided(equations_for, force=_Cushion(leak_s))[2]
     assert not found.standing
-
-
-class _Stirred:
-    """Drag of a paddle in a fluid that follows it."""
-
-    def __init__(self, follow_s):
-        self.follow_s, self.fluid, self.t = follow_s, 0.0, 0.0
-
-    def __call__(self, t, _q, v):
-        self.fluid += (v[0] - self.fluid) * min((t - self.t) / self.follow_s, 1.0)
-        self.t = t
-        return (-0.6 * (v[0] - self.fluid),)
 
 
 @pytest.mark.parametrize('follow_s', [0.2, 1.0])
