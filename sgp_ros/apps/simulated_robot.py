@@ -96,12 +96,12 @@ def _part(nominal: Nominal, before: Iterable[EffectAt]) -> TreePart:
     """
     robot = nominal.robot
     plan, payload = stated_part(robot)
-    last = nominal.plain.link_names[nominal.plain.size - 1]
+    links = nominal.plain.link_names
     loads = [] if payload is None else [
         Load(payload.link, payload.mass, payload.com, payload.inertia)
     ]  # fmt: skip
     loads += [
-        Load(last, e.numbers['mass'], tuple(e.numbers[axis] for axis in 'xyz'))
+        Load(links[e.place.joint], e.numbers['mass'], tuple(e.numbers[axis] for axis in 'xyz'))
         for e in before if e.effect.is_body
     ]  # fmt: skip
     return TreePart(

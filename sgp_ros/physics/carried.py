@@ -78,11 +78,11 @@ class GravityTilt(Effect):
 
 
 class Payload(Effect):
-    """A point mass that is fixed to the last link, in the frame of that link."""
+    """A point mass that is fixed to an outermost link, in the frame of that link."""
 
     name = 'payload'
     words = 'a payload'
-    formula = 'a point mass that is fixed to the last link'
+    formula = 'a point mass that is fixed to an outermost link'
     source = _MECHANICS
     appearance = 'all joints carry and accelerate more mass than the robot file states'
     quantities = (
@@ -103,7 +103,7 @@ class Payload(Effect):
         )
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
-        return -(motion.last_body_columns @ self.added_body(shape))[:, :, None]
+        return -(motion.load_columns[place.joint] @ self.added_body(shape))[:, :, None]
 
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
         tree, body = motion.tree, motion.tree.parameters[place.joint]
@@ -116,8 +116,8 @@ class Payload(Effect):
         reach, body = _reach(motion, place.joint), motion.tree.parameters[place.joint]
         unit = self.added_body(np.array([1.0, *(body[1:4] / max(float(body[0]), 1e-9))]))
         efforts = np.hypot(motion.effort, motion.nominal_effort)
-        carried = np.sqrt((efforts**2).sum() / max(((motion.last_body_columns @ unit) ** 2).sum(),
-                                                   1e-300))  # fmt: skip
+        of_unit = motion.load_columns[place.joint] @ unit
+        carried = np.sqrt((efforts**2).sum() / max((of_unit**2).sum(), 1e-300))
         heavy = max(_STRONGER * float(carried), 3.0 * float(body[0]))
         return np.array([0.0, -reach, -reach, -reach]), np.array([heavy, reach, reach, reach])
 

@@ -244,7 +244,7 @@ class Effect:
         return np.array([0.0, 0.0, -magnitude])
 
     def added_body(self, shape: np.ndarray) -> np.ndarray:
-        """Return the inertial parameters that it adds to the last link, (10,)."""
+        """Return the inertial parameters that it adds to a link, (10,)."""
         return np.zeros(10)
 
     def places(self, motion: SeenMotion) -> list[Place]:
@@ -254,7 +254,7 @@ class Effect:
         if self.site is TOOL:
             return [Place(-2)] if motion.tool_columns.shape[2] else []
         if self.site is LAST:
-            return [Place(motion.tree.size - 1)]
+            return [Place(joint) for joint in motion.tree.outermost]
         if not self.is_force or (self.is_of_command and motion.drive is None):
             return []
         return [

@@ -7,7 +7,7 @@ library; the laws do not, so they name here what they take.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -51,6 +51,10 @@ class Structure(Protocol):
     @property
     def parents(self) -> np.ndarray:
         """Body that each joint starts from, -1 for the root, (b,)."""
+
+    @property
+    def outermost(self) -> tuple[int, ...]:
+        """Joints whose links carry loads."""
 
     @property
     def is_actuated(self) -> np.ndarray:
@@ -201,8 +205,8 @@ class SeenMotion(Protocol):
         """Efforts of a unit force along the root axes at `tool0`, (n, k, 3); else (n, k, 0)."""
 
     @property
-    def last_body_columns(self) -> np.ndarray:
-        """Efforts per inertial parameter of the last link, (n, k, 10)."""
+    def load_columns(self) -> Mapping[int, np.ndarray]:
+        """Efforts per inertial parameter of each outermost link, by its joint, (n, k, 10)."""
 
     def effort_slopes(self, joint: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the slopes of the nominal efforts by the motion of one joint, (n, k) each."""

@@ -30,7 +30,7 @@ class Site(Enum):
 
     JOINT = 'a joint'
     MOTOR = 'a motor'
-    LAST = 'the last link of a URDF'
+    LAST = 'an outermost link of a URDF'
     BASE = 'base'
     TOOL = 'tool'
 

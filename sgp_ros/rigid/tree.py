@@ -138,6 +138,20 @@ class Tree:
         """Names of the joints that move on their own, (k,)."""
         return self.joint_names[: self.size]
 
+    @property
+    def outermost(self) -> tuple[int, ...]:
+        """Joints whose links carry loads: that of `tool0`, else all that no other one hangs on."""
+        tools = (self._leader(f.body) for f in self.frames if f.name == 'tool0')
+        inner = {self._leader(int(parent)) for parent in self.parents[: self.size]}
+        ends = tuple(i for i in range(self.size) if i not in inner)
+        return tuple(i for i in tools if i >= 0) or ends
+
+    def _leader(self, body: int) -> int:
+        """Return a body, or the nearest one inward whose joint moves on its own; -1 for none."""
+        while body >= self.size:
+            body = int(self.parents[body])
+        return body
+
     def outward_order(self) -> list[int]:
         """Return the bodies so that each comes after the one it hangs on."""
         order: list[int] = []

@@ -36,7 +36,7 @@ def changed_tree(tree: Tree, effects: Sequence[EffectAt]) -> Tree:
             continue
         if law.is_body:
             parameters = tree.parameters.copy()
-            parameters[tree.size - 1] += law.added_body(stated.shape)
+            parameters[stated.place.joint] += law.added_body(stated.shape)
             tree = replace(tree, parameters=parameters)
         else:
             size = float(np.linalg.norm(tree.gravity))

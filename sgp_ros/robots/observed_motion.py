@@ -237,14 +237,15 @@ class ObservedMotion:
         self._slopes.clear()
 
     @cached_property
-    def last_body_columns(self) -> np.ndarray:
-        """Efforts per inertial parameter of the last link, (n, k, 10)."""
-        last = self.tree.size - 1
-        found = np.empty((*self.position.shape, 10))
-        for first in range(0, len(found), _BLOCK):
+    def load_columns(self) -> dict[int, np.ndarray]:
+        """Efforts per inertial parameter of each outermost link, by its joint, (n, k, 10)."""
+        found = {j: np.empty((*self.position.shape, 10)) for j in self.tree.outermost}
+        for first in range(0, len(self.position), _BLOCK):
             rows = slice(first, first + _BLOCK)
             states = self.position[rows], self.velocity[rows], self.acceleration[rows]
-            found[rows] = torque_regressor(self.tree, *states)[:, :, 10 * last : 10 * last + 10]
+            of_all = torque_regressor(self.tree, *states)
+            for j, of_one in found.items():
+                of_one[rows] = of_all[:, :, 10 * j : 10 * j + 10]
         return found
 
     def on(self, stretches: Sequence[slice]) -> ObservedMotion:

@@ -95,7 +95,7 @@ def _check_joint(effect: Effect, joint: str, where: str, tree: Tree, problems: l
         if effect.site is TOOL and not any(f.name == 'tool0' and f.body >= 0 for f in tree.frames):
             problems.append(f'{where}: the URDF has no moving link tool0')
     elif effect.site is LAST:
-        allowed = [tree.moving_names[-1]]
+        allowed = [tree.moving_names[j] for j in tree.outermost]
     elif effect.needs_limits:
         limits = np.isfinite(tree.lower) & np.isfinite(tree.upper)
         allowed = [j for j, has in zip(tree.moving_names, limits, strict=False) if has]

@@ -87,9 +87,9 @@ class TreeText:
         friction: (k,) dry friction of `<dynamics>`, with that of followers [N m or N].
         command_joints: those with an effort interface in `ros2_control`; where none has one, those
             with any; all without such a block; those of the part where there is one.
-        last_joint: the joint nearest to `tool0`, or the last one.
+        last_joint: the joint nearest to `tool0`, or the last one that no other one hangs on.
         last_link: the link on it.
-        tool_link: `tool0`, or the last link.
+        tool_link: `tool0`, or the link on the last joint.
     """
 
     urdf: Urdf
@@ -140,7 +140,6 @@ def read_tree(text: str, part: TreePart | None = None) -> TreeText:
     }
     own = [n for n in moving if n not in followers] if part is None else list(part.joints)
     tool, last = _ends(urdf, own)
-    last = last if part is None else own[-1]
     driven = urdf.commanded
     motors = tuple(n for n in own if driven is None or n in driven)
     return TreeText(
@@ -171,11 +170,16 @@ def _joint(urdf: Urdf, name: str) -> SimulatedJoint:
 def _ends(urdf: Urdf, own: list[str]) -> tuple[str, str]:
     """Return the link of the tool and the joint with a motion of its own that carries it."""
     carried = {joint.child: joint for joint in urdf.joints.values()}
-    tool = 'tool0' if 'tool0' in carried else urdf.joints[own[-1]].child
-    last = carried[tool]
-    while last.name not in own and last.parent in carried:
-        last = carried[last.parent]
-    return tool, last.name if last.name in own else own[-1]
+
+    def inward(link: str) -> str:
+        while link in carried and carried[link].name not in own:
+            link = carried[link].parent
+        return carried[link].name if link in carried else ''
+
+    inner = {inward(urdf.joints[name].parent) for name in own}
+    end = [name for name in own if name not in inner][-1]
+    last = (inward('tool0') if 'tool0' in carried else '') or end
+    return 'tool0' if 'tool0' in carried else urdf.joints[last].child, last
 
 
 def _dry(urdf: Urdf, name: str, followers: Mapping[str, Follower]) -> float:

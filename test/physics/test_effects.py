@@ -488,11 +488,11 @@ def test_a_force_at_the_tool_does_the_work_of_its_way():
         np.testing.assert_allclose(x[:, j], way / 2e-6, atol=1e-8)
 
 
-def test_a_payload_is_a_point_mass_on_the_last_link():
+def test_a_payload_is_a_point_mass_on_an_outermost_link():
     """Its force at rest is the gradient of its height times its weight."""
     rest = replace(MOTION, velocity=np.zeros((ROWS, 4)), acceleration=np.zeros((ROWS, 4)))
     offset = np.array([0.1, -0.05, -0.2])
-    x = columns('payload', TREE.size - 1, [0.7, *offset], motion=rest)[:, :, 0]
+    x = columns('payload', TREE.outermost[0], [0.7, *offset], motion=rest)[:, :, 0]
     for j in range(TREE.size):
         h = np.zeros(TREE.size)
         h[j] = 1e-6
@@ -775,7 +775,7 @@ def test_bodies_without_mass_give_numbers():
     """A URDF may have a link without mass: no division by it."""
     empty = replace(TREE, parameters=np.zeros_like(TREE.parameters))
     motion = replace(MOTION, tree=empty)
-    last = Place(TREE.size - 1)
+    last = Place(TREE.outermost[0])
     assert np.isfinite(EFFECTS['payload'].starts(motion, last)).all()
     assert np.isfinite(columns('backlash', 0, [0.3, 0.01, 0.0, 0.0], motion=motion)).all()
 

@@ -88,6 +88,21 @@ def test_joints_may_have_the_names_of_links():
     np.testing.assert_array_equal(same.translations, tree.translations)
 
 
+def test_loads_are_on_outermost_links_in_any_order_of_the_joints():
+    """A link with `tool0` carries them; without, each one that no other hangs on."""
+    plain = ARM % ''
+    assert read_urdf(plain).joint_names == ('elbow', 'shoulder')
+    assert read_urdf(plain).outermost == (0,)
+    assert read_urdf(plain, joints=['shoulder', 'elbow']).outermost == (1,)
+    gripper = ARM % FINGER
+    assert read_urdf(gripper).moving_names == ('elbow', 'shoulder', 'grip')
+    assert read_urdf(gripper).outermost == (2,)
+    assert read_urdf(gripper.replace('"tool"', '"tool0"')).outermost == (0,)
+    hand = gripper.replace('<parent link="tool"/><child link="left"/>',
+                           '<parent link="upper"/><child link="left"/>')  # fmt: skip
+    assert read_urdf(hand).outermost == (0, 2)
+
+
 def test_joints_come_in_the_order_asked_for():
     """Torques are permuted, not changed."""
     text = random_urdf(4, 6)

@@ -30,7 +30,7 @@ OF_EFFORT = ('torque_gain', 'dead_zone', 'saturation', 'load_friction', 'joint_c
              'motor_speed_limit')  # fmt: skip
 ON_TREE = ('gravity_tilt', 'payload')
 JOINTS = {
-    'gravity_tilt': 'base', 'tip_force': 'tool', 'payload': 'grip', 'limit_friction': 'shoulder',
+    'gravity_tilt': 'base', 'tip_force': 'tool', 'payload': 'elbow', 'limit_friction': 'shoulder',
     'mount_elasticity': 'base',
 }  # fmt: skip
 KINDS = {'joint_coupling': ('spring', 'torque'), 'position_friction': ('coulomb', 'viscous')}
@@ -123,7 +123,7 @@ def _bodies(name, numbers):
     if name == 'payload':
         m, c = numbers['mass'], np.array([numbers[x] for x in 'xyz'])
         tensor = m * (c @ c * np.eye(3) - np.outer(c, c))
-        parameters[TREE.size - 1] += [
+        parameters[TREE.outermost[0]] += [
             m, *(m * c), tensor[0, 0], tensor[0, 1], tensor[1, 1], tensor[0, 2], tensor[1, 2],
             tensor[2, 2],
         ]  # fmt: skip

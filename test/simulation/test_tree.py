@@ -106,14 +106,17 @@ def test_payload_and_tip_force_of_a_pendulum_in_closed_form():
     np.testing.assert_allclose(force[0], expected, rtol=1e-9)
 
 
-def test_joints_keep_the_order_of_the_file():
-    """A file that names the outer joint first gets its numbers first."""
-    urdf = arm()
+def _swapped(urdf):
+    """Return an arm whose file names the outer joint first."""
     start = urdf.index('  <joint name="shoulder"')
     middle, end = urdf.index('  <joint name="elbow"'), urdf.index('  <link name="tool0"')
-    swapped = urdf[:start] + urdf[middle:end] + urdf[start:middle] + urdf[end:]
+    return urdf[:start] + urdf[middle:end] + urdf[start:middle] + urdf[end:]
+
+
+def test_joints_keep_the_order_of_the_file():
+    """A file that names the outer joint first gets its numbers first."""
     q, v = np.array([0.4, -0.8]), np.array([1.0, 2.0])
-    plain, turned = Tree(urdf), Tree(swapped)
+    plain, turned = Tree(arm()), Tree(_swapped(arm()))
     assert [joint.name for joint in turned.text.joints] == ['elbow', 'shoulder']
     A, h = plain.dynamics(q, v)
     B, g = turned.dynamics(q[::-1].copy(), v[::-1].copy())
@@ -126,6 +129,10 @@ def test_last_joint_carries_the_tool():
     assert read_tree(pendulum()).last_joint == 'hinge'
     assert read_tree(arm()).last_joint == 'elbow'
     assert read_tree(arm()).command_joints == ('shoulder', 'elbow')
+    turned = read_tree(_swapped(arm()).replace('tool0', 'hand'))
+    assert [joint.name for joint in turned.joints] == ['elbow', 'shoulder']
+    assert turned.last_joint == 'elbow'
+    assert turned.tool_link == read_tree(arm()).last_link
 
 
 @pytest.mark.parametrize(

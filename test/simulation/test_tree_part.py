@@ -82,7 +82,7 @@ def test_a_joint_may_be_locked_where_roll_and_yaw_are_one(seed):
 def test_joints_take_the_order_wanted():
     turned = Tree(arm(), TreePart(('elbow', 'shoulder'), motors=('elbow', 'shoulder')))
     assert names_of(turned) == turned.text.command_joints == ('elbow', 'shoulder')
-    assert turned.text.last_joint == 'shoulder'
+    assert turned.text.last_joint == 'elbow'
     M, force = dynamics(Tree(arm()), Q, V)
     N, other = dynamics(turned, Q[::-1], V[::-1])
     np.testing.assert_allclose(N, M[::-1, ::-1], rtol=1e-9)

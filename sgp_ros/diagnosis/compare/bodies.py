@@ -23,7 +23,7 @@ _SMALLEST = 1e-3
 LOAD = 0.25
 """Prior standard deviation of the mass of a load at a tip, relative to all that moves."""
 _TOOL = 0.15
-"""Distance of a load beyond the last link, relative to the length of the robot."""
+"""Distance of a load beyond an outermost link, relative to the length of the robot."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ def shrinkage(directions: np.ndarray, tree: Tree, w: np.ndarray) -> float:
 
 
 def load_precision(directions: np.ndarray, tree: Tree) -> np.ndarray:
-    """Return the inverse covariance of changes w (p,) with loads on the last links, (p, p).
+    """Return the inverse covariance of changes w (p,) with loads on outermost links, (p, p).
 
     Without a load it is one. A load has a mass, a first moment and an inertia of their own, which
     are unknown; a link without any inertia carries none.
@@ -117,7 +117,7 @@ def load_precision(directions: np.ndarray, tree: Tree) -> np.ndarray:
     precision = np.eye(len(directions))
     mass = LOAD * float(tree.parameters[:, 0].sum())
     tool = _TOOL * float(np.linalg.norm(tree.translations, axis=1).sum())
-    for tip in set(range(len(tree.parameters))) - set(tree.parents.tolist()):
+    for tip in tree.outermost:
         values, own = tree.parameters[tip], slice(10 * tip, 10 * tip + 10)
         if values[0] > 0.0:
             about = 0.5 * (values[4] + values[6] + values[9])

@@ -166,7 +166,7 @@ def _enter(effect: EffectAt, std: Mapping[str, float], found: Handover) -> None:
         return
     if not is_whole or effect.kind:
         if effect.effect.is_body:  # a load is part of the bodies, which no URDF splits again
-            words += ' (add it to the last link)'
+            words += ' (add it to the link of this joint)'
         found.others.append(words)
         return
     driven = [j for j in found.joints.values() if j.is_driven]
