@@ -182,7 +182,7 @@ def _opened(
     What is left open at joints where the rest is within the accuracy of forces need not be less
     than what is named.
     """
-    base = comparison.base
+    base, excess = comparison.base, _passed_on(best, excess)
     open_ = np.flatnonzero(excess >= 1.0)
     worst = int(open_[np.argmax(scale.base[open_])])
     known = without(
@@ -203,6 +203,23 @@ def _opened(
         return Decision('unexplained', beside, (best, *rivals), excess, worst, unknown, best,
                         base.score)  # fmt: skip
     return calm(base, rivals, scale)
+
+
+def _passed_on(model: Model, excess: np.ndarray) -> np.ndarray:
+    """Return the excess where a law that acts on two joints describes both of them or none.
+
+    What is unknown at one of them would undo there what the law says wrongly.
+    """
+    found = excess.copy()
+    while True:
+        passed = [
+            s.place.joint for s, force in zip(model.effects, model.forces, strict=True)
+            if s.place.source >= 0 and found[s.place.joint] < 1.0 <= found[s.place.source]
+            and force[:, s.place.source].any()
+        ]  # fmt: skip
+        if not passed:
+            return found
+        found[passed] = UNNAMED_EXCESS
 
 
 def _beside(equations: Equations, scale: Scale, base: Model, known: Model) -> Model:
