@@ -103,9 +103,8 @@ class Probe:
         self.directions = body_directions(tree)
         k = tree.size
         self.driven = tree.is_actuated[:k]
-        effort = (self.motion.effort**2).mean(axis=0)
         inertial = (self.motion.mass_diagonal * self.motion.acceleration).var(axis=0)
-        self.power = np.where(self.driven, effort, inertial)
+        self.power = np.where(self.driven, (self.motion.effort**2).mean(axis=0), inertial)
         self.power = np.where(self.power > 0.0, self.power, 1.0)
         # where large forces cancel their accuracy counts; in a wrong unit efforts only seem small
         cancelled = np.maximum(inertial / self.power - 1.0, 0.0)
@@ -114,7 +113,7 @@ class Probe:
         noise = measured_noise(raw, motion, bandwidth)
         self._noise_part = part_of_noise(noise, self.filter(d))
         self._pose = np.linspace(0, len(pick) - 1, 24).astype(int)
-        self._M = mass_matrix(tree, tree.parameters, self.motion.position[self._pose])
+        self._M = self._mass(tree, tree.parameters, self.motion.position[self._pose])
         self._loop = Loop.of(motion, bandwidth.cutoff)
         inertia = self.motion.mass_diagonal.mean(axis=0)
         self._rotors = np.diag(inertia) if knows_bodies else None
@@ -183,11 +182,8 @@ class Probe:
             if np.isfinite(shift):  # else bodies that cannot be
                 shift = 0.0 if self.full.has_all_efforts else shift + volume
             left = (rest**2).mean(axis=0) / power
-            found.append(
-                Agreement(
-                    value + rows * shift, number, left, d / rms, rest / rms, share, rows, own
-                )
-            )
+            evidence = value + rows * shift
+            found.append(Agreement(evidence, number, left, d / rms, rest / rms, share, rows, own))
         return max(found, key=lambda f: f.evidence)
 
     def _delivered(self, motion: ObservedMotion, correction: Correction) -> np.ndarray:
@@ -239,8 +235,12 @@ class Probe:
         """Return that of changed bodies or rotors, (k,)."""
         if self._rotors is None:
             changed = tree.parameters + (w @ self.directions).reshape(tree.parameters.shape)
-            return log_inertia(mass_matrix(tree, changed, poses), self._M)
-        return log_inertia(mass_matrix(tree, tree.parameters, poses) + self._rotors * w, self._M)
+            return log_inertia(self._mass(tree, changed, poses), self._M)
+        return log_inertia(self._mass(tree, tree.parameters, poses) + self._rotors * w, self._M)
+
+    def _mass(self, tree: Tree, bodies: np.ndarray, poses: np.ndarray) -> np.ndarray:
+        """Return the mass matrices of bodies (b, 10) with the stated rotors, (poses, k, k)."""
+        return mass_matrix(tree, bodies, poses) + np.diag(self.motion.rotors)
 
     def _floor(self, nominal: np.ndarray) -> np.ndarray:
         """Return the share of each effort, (k,), that no model explains."""

@@ -12,6 +12,8 @@ from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.evidence import Probe
 from sgp_ros.diagnosis.setup.search import search
+from sgp_ros.physics.catalogue import ARMATURE
+from sgp_ros.physics.effect_at import EffectAt
 from test.diagnosis.worlds import CHAINS, PERIOD, events_of, robot_of, simulate
 
 KGF_CM = 100.0 / 9.80665
@@ -49,6 +51,19 @@ def test_efforts_that_are_recorded_prize_no_inertia(slow):
     wrong = probe.agreement(replace(none, scale=np.full(1, 0.01)))
     assert wrong.left[0] > 1.0
     assert wrong.evidence < probe.agreement(none).evidence
+
+
+def test_less_of_a_rotor_than_stated_may_be(slow):
+    """Where it is most of the inertia of a joint; less than nothing cannot be."""
+    world, robot, tree = slow
+    rotor = {'inertia': 10.0 * float(probe_of(*slow).motion.mass_diagonal.max())}
+    stated = (EffectAt.stated(ARMATURE, tree.moving_names[0], rotor, tree),)
+    raw = collect(events_of(world), robot, stated)
+    probe = Probe(raw, tree, choose_bandwidth(raw, tree), knows_bodies=True)
+    poses = probe.motion.position[probe._pose]
+    half, none = (probe._log_inertia(tree, np.full(1, -x), poses) for x in (0.5, 1.1))
+    np.testing.assert_allclose(half, np.log(0.5), atol=0.05)
+    assert none == -np.inf
 
 
 def test_where_forces_cancel_their_accuracy_counts(slow, tmp_path):
