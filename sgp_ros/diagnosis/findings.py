@@ -20,6 +20,7 @@ from sgp_ros.diagnosis.criteria import (
 from sgp_ros.diagnosis.decide.certainty import Probabilities
 from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision
 from sgp_ros.diagnosis.decide.differences import Several
+from sgp_ros.diagnosis.decide.everyday import widened
 from sgp_ros.diagnosis.decide.reasons import why_not
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.in_recording import InRecording
@@ -49,7 +50,7 @@ def asserted(
     model = decision.model
     common = [i for i, s in enumerate(model.effects) if not isinstance(s.effect, InRecording)]
     forces = [model.forces[i] for i in common]
-    std = reported_std(model, Columns(equations), decision.unknown) if common else ()
+    std = widened(equations, model, decision.unknown) if common else ()
     for i in common:  # of friction beside something unknown, whose only number is its size
         least = decision.standing.get(model.effects[i].key, 0.0)
         std[i].update({name: max(x, least) for name, x in std[i].items()})

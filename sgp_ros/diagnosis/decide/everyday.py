@@ -12,7 +12,7 @@ is not noise.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -96,6 +96,38 @@ def _beside_delay(equations: Equations, decision: Decision) -> Decision:
     if not any(moved):
         return decision
     return replace(decision, model=whole, standing=dict.fromkeys(now.keys() - model.key, 0.0))
+
+
+def widened(
+    equations: Equations, model: Model, unknown: Collection[int] = ()
+) -> list[dict[str, float]]:
+    """Return the standard deviation of each reported number of each effect.
+
+    Friction or a rotor of which a recording shows too little to name it bends what is named. How
+    far a number moves beside them, beyond what chance would move it, is an error of it. Source:
+    Hausman 1978, Econometrica 46, 1251-1271.
+
+    Args:
+        equations: of the recording.
+        model: that is asserted.
+        unknown: joints that it does not describe, where nothing more is taken for known.
+    """
+    columns, motion = Columns(equations), equations.motion
+    found = reported_std(model, columns, unknown)
+    if unknown or motion.is_static:
+        return found
+    whole = usual(columns, model, model.effects, least=0.0)
+    if not model.key < whole.key or not is_credible(whole):
+        return found
+    beside = dict(zip((s.key for s in whole.effects), reported_std(whole, columns), strict=True))
+    now = {s.key: s.report(motion) for s in whole.effects}
+    for s, std in zip(model.effects, found, strict=True):
+        before, after, wider = s.report(motion), now[s.key], beside[s.key]
+        for name in std.keys() & wider.keys() - {'phase'}:
+            by_chance = max(wider[name] ** 2 - std[name] ** 2, 0.0)
+            moved = (float(after[name]) - float(before[name])) ** 2
+            std[name] = math.sqrt(std[name] ** 2 + max(moved - by_chance, 0.0))
+    return found
 
 
 def _standing(equations: Equations, model: Model, joint: int) -> dict[EffectAt, float]:
