@@ -27,6 +27,7 @@ import numpy as np
 from sgp_proof.concealed import fifth_families as fifth
 from sgp_proof.concealed import fourth_families as fourth
 from sgp_proof.concealed import second_families as second
+from sgp_proof.concealed import seventh_families as seventh
 from sgp_proof.concealed import sixth_families as sixth
 from sgp_proof.concealed import third_families as third
 from sgp_proof.concealed.family_set import LISTED
@@ -85,20 +86,18 @@ FAMILIES = {
     'walk': _walk,
 }
 """Name to force over its size. The last is no function of the motion: nothing is to be found."""
-SECOND_FROM, THIRD_FROM, FOURTH_FROM, FIFTH_FROM, SIXTH_FROM = (
-    20_000, 40_000, 60_000, 70_000, 80_000,
+SECOND_FROM, THIRD_FROM, FOURTH_FROM, FIFTH_FROM, SIXTH_FROM, SEVENTH_FROM = (
+    20_000, 40_000, 60_000, 70_000, 80_000, 90_000,
 )  # fmt: skip
 """Seeds from here on conceal a law of the second set, of the third, and so on."""
+_LATER = seventh, sixth, fifth, fourth, third
+_LATER_FROM = SEVENTH_FROM, SIXTH_FROM, FIFTH_FROM, FOURTH_FROM, THIRD_FROM
 _SETS = (
-    (SIXTH_FROM, sixth.FAMILIES, ''),
-    (FIFTH_FROM, fifth.FAMILIES, ''),
-    (FOURTH_FROM, fourth.FAMILIES, ''),
-    (THIRD_FROM, third.FAMILIES, ''),
+    *((begin, x.FAMILIES, '') for begin, x in zip(_LATER_FROM, _LATER, strict=True)),
     (SECOND_FROM, second.FAMILIES, 'air_spring'),
     (0, FAMILIES, 'gas_spring'),
 )
 """First seed, laws, and the law of robots of one joint in place of one of another joint."""
-_LATER = third, fourth, fifth, sixth
 _LAWS = dict(ChainMap(FAMILIES, *(x.FAMILIES for x in (second, *_LATER))))
 _REMEMBER = dict(ChainMap(*(x.REMEMBER for x in (second, *_LATER))))
 _LISTED_PARTS = dict(ChainMap(*(x.LISTED_PARTS for x in _LATER)))

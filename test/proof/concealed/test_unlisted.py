@@ -13,6 +13,7 @@ import pytest
 from sgp_proof.concealed import fifth_families as fifth
 from sgp_proof.concealed import fourth_families as fourth
 from sgp_proof.concealed import second_families as second
+from sgp_proof.concealed import seventh_families as seventh
 from sgp_proof.concealed import sixth_families as sixth
 from sgp_proof.concealed import sizes, unlisted
 from sgp_proof.concealed import third_families as third
@@ -22,6 +23,7 @@ from sgp_proof.concealed.unlisted import (
     FIFTH_FROM,
     FOURTH_FROM,
     SECOND_FROM,
+    SEVENTH_FROM,
     SIXTH_FROM,
     THIRD_FROM,
     family_of,
@@ -84,8 +86,9 @@ def test_the_second_set_is_apart_from_all_others():
     assert set(second.KNOWN_SHAPES) <= set(second.FAMILIES)
 
 
-LATER = third.FAMILIES | fourth.FAMILIES | fifth.FAMILIES | sixth.FAMILIES
-REMEMBER = third.REMEMBER | fourth.REMEMBER | fifth.REMEMBER | sixth.REMEMBER
+LATER_SETS = third, fourth, fifth, sixth, seventh
+LATER = {kind: law for x in LATER_SETS for kind, law in x.FAMILIES.items()}
+REMEMBER = [kind for x in LATER_SETS for kind in x.REMEMBER]
 EARLIER = set(FAMILIES) | set(second.FAMILIES) | set(UNKNOWN)
 
 
@@ -100,6 +103,7 @@ def _drawn(kind):
         (fourth.FAMILIES, FOURTH_FROM, EARLIER | set(third.FAMILIES)),
         (fifth.FAMILIES, FIFTH_FROM, EARLIER | set(third.FAMILIES) | set(fourth.FAMILIES)),
         (sixth.FAMILIES, SIXTH_FROM, EARLIER | (set(LATER) - set(sixth.FAMILIES))),
+        (seventh.FAMILIES, SEVENTH_FROM, EARLIER | (set(LATER) - set(seventh.FAMILIES))),
     ],
 )
 def test_a_later_set_is_apart_from_all_others(known, begin, earlier):
@@ -115,7 +119,8 @@ def test_a_later_set_is_apart_from_all_others(known, begin, earlier):
 
 
 @pytest.mark.parametrize(
-    ('known', 'begin'), [(fourth, FOURTH_FROM), (fifth, FIFTH_FROM), (sixth, SIXTH_FROM)]
+    ('known', 'begin'),
+    [(fourth, FOURTH_FROM), (fifth, FIFTH_FROM), (sixth, SIXTH_FROM), (seventh, SEVENTH_FROM)],
 )
 def test_a_later_set_has_its_seeds_in_order(known, begin):
     """Twenty families, from its first seed on."""
@@ -131,7 +136,7 @@ def test_other_sets_draw_no_constants():
 @pytest.mark.parametrize('kind', LATER)
 def test_constants_are_drawn_within_their_ranges(kind):
     """And the reach of the source is kept with them."""
-    known = next(x for x in (third, fourth, fifth, sixth) if kind in x.FAMILIES)
+    known = next(x for x in LATER_SETS if kind in x.FAMILIES)
     for seed in range(5):
         drawn = known.SET.constants(kind, np.random.default_rng(seed), 0.7)
         assert drawn.pop('source_reach') == 0.7
@@ -224,15 +229,24 @@ def test_listed_friction_in_a_law_may_be_named_beside_the_rest(is_apart):
             'leaf_set_by_other', '0.5*q[elbow]*(1 - 1/max(1 - lever*q[wrist]/0.7, 0.3)**2)',
             lambda _p: {'stiffness': 0.5, 'rest': 0.0},
         ),
+        (
+            'galloping_in_wind', '-0.75*(dq[elbow]/1.5)**3/steady**2',
+            lambda _p: {'b': -0.5},
+        ),
+        (
+            'damper_swung_by_other', '-dq[elbow]/3*cos(2*(swing*q[wrist]/0.7 + lean))',
+            lambda _p: {'b': 1.0 / 3.0},
+        ),
     ],
 )  # fmt: skip
 def test_a_listed_part_may_be_named_beside_the_rest(kind, rest, parameters):
     """As that effect with its numbers; without it the rest is a wrong law."""
     p = {**_drawn(kind), 'source': 'wrist'}
-    numbers = {name: {'value': p[name]} for name in fourth.SET.ranges[kind]}
+    known = next(x for x in LATER_SETS if kind in x.FAMILIES)
+    numbers = {name: {'value': p[name]} for name in known.SET.ranges[kind]}
     law = {**RIGHT, 'formula': f'tau_x[elbow] = {rest}', 'parameters': numbers}
     values = {name: {'value': x} for name, x in parameters(p).items()}
-    part = {**LISTED, 'effect': fourth.LISTED_PARTS[kind], 'parameters': values}
+    part = {**LISTED, 'effect': known.LISTED_PARTS[kind], 'parameters': values}
     answer = {'case': 'case_1', 'effects': [{**EFFECT, 'parameters': p}]}
     for findings, right in (([law, part], True), ([law], False)):
         row = score(answer, {'verdict': 'missing_physics', 'findings': findings, 'fit': {}})
@@ -241,8 +255,7 @@ def test_a_listed_part_may_be_named_beside_the_rest(kind, rest, parameters):
 
 def test_every_listed_part_of_a_law_can_be_scored():
     """The scorer knows the force of each."""
-    known = third, fourth, fifth, sixth
-    parts = {kind: part for x in known for kind, part in x.LISTED_PARTS.items()}
+    parts = {kind: part for x in LATER_SETS for kind, part in x.LISTED_PARTS.items()}
     assert set(parts) <= set(LATER)
     assert set(parts.values()) <= set(unlisted.LISTED)
 
@@ -284,13 +297,22 @@ def test_every_listed_part_of_a_law_can_be_scored():
             'bucket_filled_by_motion', '-a*lag(abs(dq[elbow]), T)*sin(n*q[elbow] + x)',
             {'a': 0.75 / 1.5, 'T': 0.4, 'n': 2.0, 'x': 0.3},
         ),
+        (
+            'self_excited_brake', '-a*lag(dq[elbow], T)**2*dq[elbow]',
+            {'a': 0.75 / 1.5**3, 'T': 0.3},
+        ),
+        (
+            'oil_along_beam', 'a*lag(q[elbow], T)*cos(n*q[elbow] + x)',
+            {'a': 1.5, 'T': 0.5, 'n': 2.0, 'x': 0.3},
+        ),
     ],
 )  # fmt: skip
 def test_laws_that_remember_are_compared_along_a_motion(kind, formula, numbers):
     """But for the steps of that motion; without its memory none of them is right."""
     chosen = {'fill_s': 0.25, 'heat': 0.9, 'warm_s': 2.0, 'slack': 0.25, 'knee': 0.3,
               'stroke': 0.6, 'leak_s': 0.4, 'poles': 3.0, 'phase': 0.2,
-              'follow_s': 0.5, 'oil_s': 0.6, 'swing': 2.0, 'lean': 0.3}  # fmt: skip
+              'follow_s': 0.5, 'oil_s': 0.6, 'swing': 2.0, 'lean': 0.3,
+              'coil_s': 0.3, 'run_s': 0.5}  # fmt: skip
     effect = {'joint': 'elbow', 'parameters': {**P, **chosen, 'kind': kind}}
     finding = {'formula': f'tau_x[elbow] = {formula}',
                'parameters': {name: {'value': x} for name, x in numbers.items()}}  # fmt: skip
