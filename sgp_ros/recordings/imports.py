@@ -193,10 +193,14 @@ def quality(table: Table) -> dict[str, Any]:
         'gaps': int((steps > _GAP * usual).sum()) if usual > 0.0 else 0,
         'backward': int((steps < 0.0).sum()),
         'repeated': int((steps == 0.0).sum()),
-        'missing': {
-            name: int(np.isnan(x).sum()) for name, x in {**table.channels, **asked}.items()
-        },
+        'missing': {name: _missing(x) for name, x in {**table.channels, **asked}.items()},
     }
+
+
+def _missing(numbers: np.ndarray) -> int:
+    """Return how many numbers (n, k) are missing of joints that have any."""
+    is_nan = np.isnan(numbers)
+    return int(is_nan[:, ~is_nan.all(axis=0)].sum())
 
 
 def _gains(out_path: Path, stated: object) -> Path | None:

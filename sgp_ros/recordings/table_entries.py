@@ -63,9 +63,16 @@ class Entry:
     label: str
     numbers: np.ndarray
 
-    def unit_of_position(self, usual: str) -> str:
-        """Return the unit of a position that the name states, or else the usual one."""
-        return self.said.unit if self.said.unit in {'rad', 'deg', 'rev', 'm', 'mm'} else usual
+    def unit_of_position(self, usual: str, *, is_known: bool) -> str:
+        """Return the unit of a position that the name states, or else the usual one.
+
+        If it is known whether the joint slides, as the usual one says, it is one of that kind: the
+        end of `theta_m` may stand for a motor.
+        """
+        kinds = {'rad': 1, 'deg': 1, 'rev': 1, 'm': 0, 'mm': 0}
+        said = self.said.unit
+        is_it = said in kinds and not (is_known and kinds[said] != kinds.get(usual, kinds[said]))
+        return said if is_it else usual
 
     def place(self, unit: str, **more: float) -> dict[str, Any]:
         """Return the entry of a map."""
@@ -161,8 +168,10 @@ def _labelled(entries: list[Entry]) -> list[Entry]:
 
 def of_slides(entries: Sequence[Entry], hints: Sequence[JointHint], guess: Guess) -> list[Entry]:
     """Let `x` be positions and `dx` velocities of a robot with a joint that slides."""
-    if not any(h.slides for h in hints):
+    slides = [h.name for h in hints if h.slides]
+    if not slides:
         return list(entries)
+    only = slides[0] if len(slides) == 1 else ''
     found = []
     for e in entries:
         symbols = [w for w in e.said.rest if w.lower() in _OF_SLIDES]
@@ -171,7 +180,7 @@ def of_slides(entries: Sequence[Entry], hints: Sequence[JointHint], guess: Guess
             continue
         rest = tuple(w for w in e.said.rest if w not in symbols)
         said = replace(e.said, role=_OF_SLIDES[symbols[0].lower()], rest=rest)
-        found.append(replace(e, said=said, label=said.joint))
+        found.append(replace(e, said=said, label=said.joint or only))
         what = f'{"target " * said.is_target}{said.role}'
         guess.unsure.append(f'{e.column} is taken as the {what} of a joint that slides.')
     return found

@@ -143,7 +143,8 @@ def _position_units(
     said = {x: positions[x].said.unit for x in positions}
     ranges = [
         (positions[x].numbers, hint.lower, hint.upper) for x, hint in hints.items()
-        if not hint.slides and said[x] not in {'rad', 'deg', 'rev', 'counts', 'm', 'mm'}
+        if not hint.slides and said[x] not in {'rad', 'deg', 'rev', 'counts'}
+        and not (said[x] in {'m', 'mm'} and joints[x] not in hinted)
     ]  # fmt: skip
     angle, is_sure = position_unit(ranges, are_joints_known=bool(hinted))
     if ranges and not is_sure:
@@ -153,7 +154,8 @@ def _position_units(
     units = {}
     for x, hint in hints.items():
         slide = slide_unit(positions[x].numbers, hint.lower, hint.upper) if hint.slides else ''
-        units[x] = positions[x].unit_of_position(slide or angle)
+        is_known = joints[x] in hinted
+        units[x] = positions[x].unit_of_position(slide or angle, is_known=is_known)
         if units[x] == 'mm' != said[x]:
             guess.unsure.append(f'{joints[x]} is assumed to be in mm, to stay within its range.')
     return units
@@ -257,7 +259,9 @@ def _add_commands(
         named[POSITION] = {}
     targets = {
         joints[x]: {
-            kind: e[x].place(e[x].unit_of_position(units[x]) + '/s' * (kind == VELOCITY))
+            kind: e[x].place(
+                e[x].unit_of_position(units[x], is_known=True) + '/s' * (kind == VELOCITY)
+            )
             for kind, e in ((POSITION, named[POSITION]), (VELOCITY, named[VELOCITY])) if x in e
         }
         for x in joints if x in named[POSITION] or x in named[VELOCITY]

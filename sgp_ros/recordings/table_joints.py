@@ -66,6 +66,13 @@ def joint_names(
         is_each = len(set(unique.values())) == len(unique)
         if is_each and len(unique) in {len(labels), len(hints)}:
             return unique
+        if is_each and len(unique) + 1 == len(labels) == len(hints) > 1:
+            (label,), (name,) = {*labels} - {*unique}, {*names_of_robot} - {*unique.values()}
+            guess.unsure.append(
+                f'{positions[label].column} is taken as the position of {name}, the only joint '
+                'without one.'
+            )
+            return {**unique, label: name}
     numbered = [x for x in labels if x.isdigit()]
     if len(labels) > len(hints) == len(numbered):
         labels = numbered  # others, such as that of a gripper, are not the robot's
@@ -77,9 +84,8 @@ def joint_names(
             for x, h in zip(order, hints, strict=True)
         )
         if len(labels) > 1:
-            guess.unsure.append(
-                f'Columns are assigned to joints in the order of the robot file: {said}.'
-            )
+            by = 'in the order of the robot file' if order is plain else 'by their numbers'
+            guess.unsure.append(f'Columns are assigned to joints {by}: {said}.')
         return {x: h.name for x, h in zip(order, hints, strict=True)}
     raise RecordingError(
         f'positions of {len(labels)} joints ({", ".join(e.column for e in positions.values())})',
@@ -91,8 +97,8 @@ def joint_names(
 def _by_numbers(
     order: Sequence[str], names: Mapping[str, str], hints: Sequence[JointHint]
 ) -> Sequence[str]:
-    """Return labels in the order of the robot's joints, if all names end in the same numbers."""
-    ends = {re.split(r'\D', names.get(x, ''))[-1]: x for x in order}
+    """Return labels in the order of the robot's joints, if all end in the numbers of these."""
+    ends = {re.split(r'\D', names.get(x, x))[-1]: x for x in order}
     asked = [re.split(r'\D', h.name)[-1] for h in hints]
     return [ends[x] for x in asked] if {*asked} == {*ends} and len(ends) == len(order) else order
 

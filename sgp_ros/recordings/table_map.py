@@ -252,7 +252,10 @@ class _Check:
     ) -> float:
         unit = content.get('unit')
         if not isinstance(unit, str) or unit not in units:
-            self.problems.append(f'{place}.unit {unit!r}: expected one of {", ".join(units)}')
+            said = f'{place}.unit {unit!r}: expected one of {", ".join(units)}'
+            is_target = place.startswith('commands.') and unit in UNITS['position']
+            said += '; position targets are listed under `targets`' * is_target
+            self.problems.append(said)
             return 1.0
         factor = units[unit]
         if factor is None and 'scale' not in content:

@@ -45,7 +45,8 @@ def row_stamps(path: Path, columns: Columns, time: TimeBase, n: int) -> tuple[in
             raise RecordingError(
                 f'{path}, column {time.quantity.column}, row {row}: time {value!r}',
                 'a time between 0 s and 2^31 s since the epoch',
-                'correct the table, or set time.unit and time.start in the map',
+                'correct the table, or set time.unit, or time.start to the seconds that are added '
+                'to each time, in the map',
             )
         stamps.append(stamp_ns)
     found = _one_after_another(stamps, columns[time.episode]) if time.episode else tuple(stamps)

@@ -129,6 +129,41 @@ def test_x_is_the_position_of_a_joint_that_slides(tmp_path):
         _read(path, tmp_path, (JointHint('arm'),))
 
 
+def test_what_no_name_says_belongs_to_the_joint_that_is_left(tmp_path):
+    """A cart and its pole: `x` slides, and `F` is that of the only motor."""
+    columns = {
+        't [s]': T,
+        'phi [deg]': np.degrees(Q[:, 1]),
+        'x [mm]': 1e3 * Q[:, 0],
+        'F': TAU[:, 0],
+    }
+    hints = (JointHint('pole', is_driven=False), JointHint('rail', slides=True))
+    summary, states, _ = _read(_npz(tmp_path, **columns), tmp_path, hints)
+    assert any('phi [deg] is taken as the position of pole' in said for said in summary.unsure)
+    rail, pole = (states[0].names.index(name) for name in ('rail', 'pole'))
+    np.testing.assert_allclose([s.position[rail] for s in states], Q[:, 0])
+    np.testing.assert_allclose([s.position[pole] for s in states], Q[:, 1])
+    np.testing.assert_allclose([s.effort[rail] for s in states], TAU[:, 0])
+    assert summary.quality['missing'] == {'position': 0, 'effort': 0}
+
+
+def test_columns_with_the_numbers_of_the_joints_are_theirs(tmp_path):
+    """In whatever order the robot file names them."""
+    hints = (JointHint('axis_2'), JointHint('axis_1'))
+    columns = {'t': T, 'A1.Pos_rad': Q[:, 0], 'A2.Pos_rad': Q[:, 1]}
+    summary, states, _ = _read(_npz(tmp_path, **columns), tmp_path, hints)
+    assert any('by their numbers' in said for said in summary.unsure)
+    np.testing.assert_allclose([s.position[s.names.index('axis_1')] for s in states], Q[:, 0])
+
+
+def test_the_motor_of_a_joint_that_turns_is_no_length(tmp_path):
+    path = _npz(tmp_path, t=T, theta_m=Q[:, 0], theta_m_des=LATE[:, 0])
+    _, states, _ = _read(path, tmp_path, (JointHint('elbow'),))
+    np.testing.assert_allclose([s.position[0] for s in states], Q[:, 0])
+    content = yaml.safe_load((tmp_path / 'out' / 'log_map.yaml').read_text())
+    assert content['joints']['elbow']['position']['unit'] == 'rad'
+
+
 def test_joints_of_another_driver_are_those_of_the_robot_with_their_numbers(tmp_path):
     hints = (JointHint('lab_joint1'), JointHint('lab_joint2'))
     names = np.array(['fer_joint2', 'fer_joint1'])
