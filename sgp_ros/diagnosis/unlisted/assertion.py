@@ -9,6 +9,7 @@ unexplained, and listed effects that explain it less well than the smooth force 
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -24,6 +25,7 @@ from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.joint_search import usual
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.unlisted.beside import PLAIN, acts_as_bodies, law_of, own_effects, says_less
 from sgp_ros.diagnosis.unlisted.search import search
@@ -68,8 +70,10 @@ def with_laws(equations: Equations, comparison: Comparison, decision: Decision) 
     named = [j for j in joints if j not in decision.unknown]
     coloured = _coloured(equations, scale, decision.model, named)
     open_ = {*decision.unknown, *coloured, *_remembering(decision.model)}
+    apart, waiting = _apart(columns, decision), list[Searched]()
     for joint in joints:
         listed = found.decision.tentative or found.decision.model
+        listed = waiting[-1].laws[0] if waiting else apart or listed
         is_open = joint in open_
         if not is_open and not promises(columns, listed, joint):
             continue
@@ -77,10 +81,29 @@ def with_laws(equations: Equations, comparison: Comparison, decision: Decision) 
         if searched is None:
             continue
         more = replace(found, searched=(*found.searched, searched))
-        more = _decided(equations, more, searched)
-        if not searched.is_slight or law_of(more.decision.model, joint) is not None:
+        more = _decided(equations, more, searched, waiting)
+        is_law = law_of(more.decision.model, joint) is not None
+        if not searched.is_slight or is_law:
             found = more
+        if is_law:
+            apart, waiting = None, []
+        elif joint in decision.unknown and not _objection(equations, comparison, searched):
+            waiting.append(searched)
     return found
+
+
+def _apart(columns: Columns, decision: Decision) -> Model | None:
+    """Return the best model with everyday laws in place of those of two unknown joints.
+
+    None where it has none. Such a law may have imitated what is unknown at either of them.
+    """
+    model = decision.tentative or decision.model
+    kept = tuple(
+        s
+        for s in model.effects
+        if s.place.source < 0 or not {s.place.joint, s.place.source} <= {*decision.unknown}
+    )
+    return None if kept == model.effects else usual(columns, model, kept, least=0.0)
 
 
 def _coloured(equations: Equations, scale: Scale, model: Model, named: list[int]) -> list[int]:
@@ -110,8 +133,13 @@ def _joints(equations: Equations, comparison: Comparison, decision: Decision) ->
     return list(dict.fromkeys((*decision.unknown, *order)))[:MOST_JOINTS]
 
 
-def _decided(equations: Equations, found: Explained, searched: Searched) -> Explained:
-    """Return what is decided with the laws of one more joint."""
+def _decided(
+    equations: Equations, found: Explained, searched: Searched, waiting: Sequence[Searched]
+) -> Explained:
+    """Return what is decided with the laws of one more joint.
+
+    Those of the joints that are waiting, which alone would leave others unexplained, are in them.
+    """
     is_open = searched.joint in found.decision.unknown
     if not is_open and _is_listed(equations, found.comparison, searched):
         return found
@@ -125,10 +153,14 @@ def _decided(equations: Equations, found: Explained, searched: Searched) -> Expl
         # which formula says it best is known: errors of a column's shape count between names only
         decision = decide(equations, replace(found.comparison, more=(*more, laws[0])))
         decision = replace(decision, rivals=(*laws[1:], *decision.rivals))
+        laws = (*laws, *_rivals(equations, laws[0], waiting))
         comparison = replace(found.comparison, more=(*more, *laws))
-        why = _doubt(equations, comparison, decision, searched)
+        doubts = (_doubt(equations, comparison, decision, s) for s in (searched, *waiting))
+        why = next(filter(None, doubts), '')
         if not why:
-            return replace(found, comparison=comparison, decision=decision)
+            said = {s.joint for s in waiting}
+            why_not = {j: x for j, x in found.why_not.items() if j not in said}
+            return replace(found, comparison=comparison, decision=decision, why_not=why_not)
     joint = equations.motion.tree.joint_names[searched.joint]
     named = f'a force without a formula describes {joint} better than listed effects do'
     decision = refused(equations, found.comparison, found.decision, searched.joint, named)
@@ -138,6 +170,21 @@ def _decided(equations: Equations, found: Explained, searched: Searched) -> Expl
         decision, rivals=(*laws, *decision.rivals), refusals=dict(decision.refusals) | refusals
     )
     return replace(found, decision=decision, why_not=found.why_not | {searched.joint: why})
+
+
+def _rivals(
+    equations: Equations, best: Model, waiting: Sequence[Searched]
+) -> Iterator[Model]:  # fmt: skip
+    """Yield a model with other formulas in place of those of the joints that are waiting."""
+    columns = Columns(equations)
+    for searched in waiting:
+        law = law_of(best, searched.joint)
+        others = tuple(s for s in best.effects if s is not law)
+        for rival in searched.laws[1:_RIVALS]:
+            other = law_of(rival, searched.joint)
+            assert other is not None
+            yield fit(columns, (*others, other), best.sigma, is_free=best.is_free, w=best.w,
+                      rounds=2, steps=_STEPS, still=len(others))  # fmt: skip
 
 
 def _is_listed(equations: Equations, comparison: Comparison, searched: Searched) -> bool:

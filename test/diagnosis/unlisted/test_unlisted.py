@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from sgp_ros.diagnosis.criteria import ALIKE, COUNTED_SHARE, LACKING, SIGNIFICANT
-from sgp_ros.diagnosis.decide.decision import decide
+from sgp_ros.diagnosis.decide.decision import Decision, decide
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import compare_models
@@ -112,7 +112,8 @@ def test_the_shape_is_described_in_words_and_numbers(braked):
     assert len(written[0]['shape']['mean']) == len(search.x)
 
 
-@pytest.mark.parametrize('name', ['noise', pytest.param('time', marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize('name', ['noise', 'time'])
 def test_what_is_no_function_of_the_motion_has_no_law(equations_for, name):
     """Neither a disturbance that wanders, nor one that comes and goes by the clock."""
     rng = np.random.default_rng(5)
@@ -291,7 +292,8 @@ def test_a_law_is_found_beside_friction_that_was_not_named(equations_for):
     assert found.laws[0].left[0] < 0.1 * COUNTED_SHARE
 
 
-@pytest.mark.parametrize('is_kept', [True, pytest.param(False, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize('is_kept', [True, False])
 def test_names_stay_only_beside_a_formula_that_differs_little_too(
     equations_for, monkeypatch, is_kept
 ):
@@ -307,6 +309,7 @@ def test_names_stay_only_beside_a_formula_that_differs_little_too(
     assert found.is_slight is is_kept
 
 
+@pytest.mark.long
 def test_a_formula_that_bodies_would_imitate_is_not_asserted(equations_for, monkeypatch):
     monkeypatch.setattr(assertion, 'acts_as_bodies', lambda *_: True)
     _, equations = equations_for(simulate(CHAINS[1], 11, 10.0, force=_brake))
@@ -491,6 +494,43 @@ def test_a_series_of_waves_gives_way_to_a_law_that_says_all_of_it(equations_for,
     law = law_of(found, 0)
     if is_flap:
         assert law.effect.formula.partition(' = ')[2].startswith('a*abs(sin(')
+
+
+@pytest.mark.long
+def test_laws_of_two_joints_are_found_together(equations_for):
+    """A gyro turns what one joint does into a force on the other, and back."""
+
+    def force(_t, q, v):
+        h = 0.6 * math.cos(q[1])
+        return h * v[1] - 0.3 * v[0], -h * v[0] - 0.2 * v[1]
+
+    _, equations = equations_for(simulate(CHAINS[2], 9, 20.0, force=force, reach=0.8))
+    comparison = compare_models(equations, lambda _share: None)
+    decision = decide(equations, comparison)
+    found = with_laws(equations, comparison, decision)
+    assert found.decision.verdict == 'missing_physics'
+    assert found.decision.unknown == ()
+    assert found.why_not == {}
+    motion = equations.motion
+    for joint, sign in ((0, 1.0), (1, -1.0)):
+        law = law_of(found.decision.model, joint)
+        expected = sign * 0.6 * np.cos(motion.position[:, 1]) * motion.velocity[:, 1 - joint]
+        np.testing.assert_allclose(law.force(motion)[:, joint], expected, atol=0.02)
+
+
+def test_what_is_unknown_at_two_joints_is_looked_for_beside_everyday_laws(equations_for):
+    """Not beside a law of both, which may have imitated it."""
+    _, equations = equations_for(
+        simulate(CHAINS[2], 9, 8.0, force=lambda t, q, v: (-0.3 * v[0], 0))
+    )
+    columns, place = Columns(equations), Place(1, source=0)
+    law = EFFECTS['coupled_friction']
+    both = EffectAt(law, place, law.starts(equations.motion, place)[0])
+    model = fit(columns, (both,), fitted(equations).sigma, is_free=False)
+    decision = Decision('unexplained', model, (), np.ones(2), 0, (0, 1))
+    apart = assertion._apart(columns, decision)
+    assert {s.name for s in apart.effects} <= {'viscous_friction', 'coulomb_friction', 'armature'}
+    assert assertion._apart(columns, replace(decision, unknown=(0,))) is None
 
 
 @pytest.mark.parametrize(('share', 'joints'), [(0.9, [1]), (0.1, [])])
