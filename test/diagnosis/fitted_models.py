@@ -15,10 +15,13 @@ from sgp_ros.physics.parts import Place
 
 
 def fitted(equations, *names, is_free=False):
-    """Return a model of effects on joint 0, from the first of their shapes."""
+    """Return a model of effects on joint 0, or on a link, from the first of their shapes."""
+    motion = equations.motion
+    laws = [EFFECTS[n] for n in names]
+    places = [law.places(motion)[0] if law.is_body else Place(0) for law in laws]
     candidates = tuple(
-        EffectAt(EFFECTS[n], Place(0), EFFECTS[n].starts(equations.motion, Place(0))[0])
-        for n in names
+        EffectAt(law, place, law.starts(motion, place)[0])
+        for law, place in zip(laws, places, strict=True)
     )
     start = np.sqrt((equations.d**2).mean(axis=0) + floors(equations))
     return fit(Columns(equations), candidates, start, is_free=is_free)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,8 +18,9 @@ from sgp_ros.diagnosis.criteria import (
     LEAST_SHARE,
     SHARE_TOLERANCE,
     SLIGHT_REST,
+    UNNAMED_EXCESS,
 )
-from sgp_ros.diagnosis.decide.decision import _opened, decide
+from sgp_ros.diagnosis.decide.decision import _opened, _passed_on, decide
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import added_inertia, fit
 from sgp_ros.diagnosis.explain.comparison import Comparison, compare_models
@@ -253,6 +255,33 @@ def test_what_is_known_of_a_joint_stands_beside_a_larger_unknown(half_known):
     assert decision.unknown == (0,)
     assert {(s.name, s.place.joint) for s in decision.model.effects} == {('viscous_friction', 1)}
     assert decision.model.effects[0].coefficients[0] == pytest.approx(0.2, rel=0.01)
+
+
+def test_a_law_of_two_joints_is_unknown_where_one_of_them_is():
+    """It acts on both, and what is unknown there would undo it; one that acts on one stands."""
+
+    def excess(source, acts_on_it):
+        law = SimpleNamespace(place=Place(0, source=source))
+        force = np.array([[1.0, float(acts_on_it), 0.0]])
+        model = SimpleNamespace(effects=(law,), forces=(force,))
+        return _passed_on(model, np.array([0.1, 3.0, 0.2])).tolist()
+
+    assert excess(1, acts_on_it=True) == [UNNAMED_EXCESS, 3.0, 0.2]
+    assert excess(1, acts_on_it=False) == [0.1, 3.0, 0.2]
+    assert excess(2, acts_on_it=True) == [0.1, 3.0, 0.2]
+    assert excess(-1, acts_on_it=True) == [0.1, 3.0, 0.2]
+
+
+def test_small_everyday_laws_stand_beside_larger_ones(equations_for):
+    """Two laws of one joint leave little; the friction of the other is worth it all the same."""
+    world = simulate(
+        CHAINS[2], 8, 12.0,
+        force=lambda t, q, v: (-0.5 * v[0] - 0.8 * math.sin(3.0 * q[0]), -0.02 * v[1]),
+    )  # fmt: skip
+    equations = equations_for(world)[1]
+    comparison = compare_models(equations, lambda _share: None)
+    best = max(comparison.more, key=lambda m: m.score)
+    assert ('viscous_friction', 1) in {(s.name, s.place.joint) for s in best.effects}
 
 
 def test_a_joint_is_judged_by_what_there_was_to_explain_there(half_known):

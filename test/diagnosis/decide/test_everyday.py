@@ -13,8 +13,10 @@ from sgp_ros.diagnosis.decide import everyday
 from sgp_ros.diagnosis.decide.certainty import settled_of
 from sgp_ros.diagnosis.decide.decision import Decision
 from sgp_ros.diagnosis.decide.differences import Several
-from sgp_ros.diagnosis.decide.everyday import with_everyday
+from sgp_ros.diagnosis.decide.everyday import widened, with_everyday
 from sgp_ros.diagnosis.explain.comparison import Comparison
+from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.findings import asserted
 from sgp_ros.diagnosis.locate.dependence import dependences
 from sgp_ros.physics.catalogue import EFFECTS
@@ -31,6 +33,24 @@ LEVEL, DAMPING = 0.4, 0.15
 def _wave(size, damping=DAMPING):
     """Return a force of position and time, of no law of the list, beside damping."""
     return lambda t, q, v: (size * math.sin(7.0 * q[0]) * math.sin(1.3 * t) - damping * v[0],)
+
+
+@pytest.mark.parametrize('damping', [0.0, 0.05])
+def test_friction_too_small_to_be_named_widens_intervals(equations_for, damping):
+    """It bends the level of dry friction, and only there is more than chance added."""
+    world = simulate(CHAINS[1], 21, 20.0, dry=lambda *_: LEVEL,
+                     force=lambda t, q, v: (-damping * v[0],))  # fmt: skip
+    equations = equations_for(world)[1]
+    model = fitted(equations, 'coulomb_friction')
+    (plain,), (wide,) = (f(equations, model) for f in (_plain, widened))
+    bent = abs(float(model.effects[0].coefficients[0]) - LEVEL)
+    assert bent < INTERVAL * wide['level']
+    assert (bent > INTERVAL * plain['level']) is bool(damping)
+    assert (wide['level'] > 1.5 * plain['level']) is bool(damping)
+
+
+def _plain(equations, model):
+    return reported_std(model, Columns(equations))
 
 
 class _Lag:
