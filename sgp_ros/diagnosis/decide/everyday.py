@@ -29,7 +29,12 @@ from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.joint_search import usual
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
-from sgp_ros.physics.catalogue import COMMAND_DELAY, COULOMB_FRICTION, VISCOUS_FRICTION
+from sgp_ros.physics.catalogue import (
+    COMMAND_DELAY,
+    COULOMB_FRICTION,
+    STRIBECK_FRICTION,
+    VISCOUS_FRICTION,
+)
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.law import remembered
 from sgp_ros.physics.parts import Place
@@ -103,9 +108,10 @@ def widened(
 ) -> list[dict[str, float]]:
     """Return the standard deviation of each reported number of each effect.
 
-    Friction or a rotor of which a recording shows too little to name it bends what is named. How
-    far a number moves beside them, beyond what chance would move it, is an error of it. Source:
-    Hausman 1978, Econometrica 46, 1251-1271.
+    Friction or a rotor of which a recording shows too little to name it bends what is named. So
+    does friction that falls with speed, named as Coulomb friction. How far a number moves
+    beside them, beyond what chance would move it, is an error of it. Source: Hausman 1978,
+    Econometrica 46, 1251-1271.
 
     Args:
         equations: of the recording.
@@ -116,18 +122,36 @@ def widened(
     found = reported_std(model, columns, unknown)
     if unknown or motion.is_static:
         return found
-    whole = usual(columns, model, model.effects, least=0.0)
-    if not model.key < whole.key or not is_credible(whole):
-        return found
-    beside = dict(zip((s.key for s in whole.effects), reported_std(whole, columns), strict=True))
-    now = {s.key: s.report(motion) for s in whole.effects}
-    for s, std in zip(model.effects, found, strict=True):
-        before, after, wider = s.report(motion), now[s.key], beside[s.key]
-        for name in std.keys() & wider.keys() - {'phase'}:
-            by_chance = max(wider[name] ** 2 - std[name] ** 2, 0.0)
-            moved = (float(after[name]) - float(before[name])) ** 2
-            std[name] = math.sqrt(std[name] ** 2 + max(moved - by_chance, 0.0))
+    more = usual(columns, model, model.effects, least=0.0)
+    plain = [dict(std) for std in found]
+    for whole in (more, _falling(columns, more)):
+        beside = zip(whole.effects, reported_std(whole, columns), strict=True)
+        now = {s.key: (s.report(motion), std) for s, std in beside}
+        for s, std, own in zip(model.effects, found, plain, strict=True):
+            before, (after, wider) = s.report(motion), now.get(s.key, ({}, {}))
+            for name in own.keys() & wider.keys() - {'phase'}:
+                by_chance = max(wider[name] ** 2 - own[name] ** 2, 0.0)
+                moved = (float(after[name]) - float(before[name])) ** 2
+                wide = math.sqrt(own[name] ** 2 + max(moved - by_chance, 0.0))
+                std[name] = max(std[name], wide)
     return found
+
+
+def _falling(columns: Columns, model: Model) -> Model:
+    """Return a model with friction that falls with speed in place of Coulomb friction."""
+    motion, law = model.frame.equations.motion, STRIBECK_FRICTION
+    steady = {i for i, s in enumerate(model.effects) if s.effect is not COULOMB_FRICTION}
+    while True:
+        effects = tuple(
+            s if i in steady
+            else EffectAt(law, s.place, np.median(law.starts(motion, s.place), axis=0))
+            for i, s in enumerate(model.effects)
+        )  # fmt: skip
+        trial = fit(columns, effects, model.sigma, is_free=model.is_free, w=model.w)
+        wrong = {i for i, s in enumerate(trial.effects) if not s.is_possible(motion)} - steady
+        if not wrong:
+            return trial
+        steady |= wrong
 
 
 def _standing(equations: Equations, model: Model, joint: int) -> dict[EffectAt, float]:
