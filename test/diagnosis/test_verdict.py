@@ -59,11 +59,10 @@ class AskedError(Exception):
 def test_intervals_of_findings_are_told_which_joints_are_unknown(monkeypatch):
     """A rest there widens no interval of another joint."""
 
-    def reported_std(_model, _columns, unknown=()):
+    def widened(_equations, _model, unknown=()):
         raise AskedError(unknown)
 
-    monkeypatch.setattr(findings, 'reported_std', reported_std)
-    monkeypatch.setattr(findings, 'Columns', lambda equations: equations)
+    monkeypatch.setattr(findings, 'widened', widened)
     model = SimpleNamespace(effects=(SimpleNamespace(effect=None),), forces=(None,))
     decision = SimpleNamespace(model=model, unknown=(1,))
     with pytest.raises(AskedError) as asked:
