@@ -138,9 +138,9 @@ def _from_document(text: str, path: Path) -> Robot:
         except ConfigError as error:
             problems.append(str(error))
     if problems or robot is None:
-        raise ConfigError(
-            f'robot file {path}: ' + ' | '.join(problems), f'the keys {sorted(keys)}'
-        )
+        text = ' | '.join(problems)
+        known = f'the keys {sorted(keys)}' if not problems or 'unknown key' in text else ''
+        raise ConfigError(f'robot file {path}: {text}', known)
     return robot
 
 

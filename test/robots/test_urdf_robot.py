@@ -160,10 +160,11 @@ parameters: {fore.mass: {value: 1.2, std: 0.1, unit: kg}}
     ],
 )
 def test_a_wrong_entry_is_refused_in_one_line(tmp_path, text, found):
-    """The line names the entry."""
+    """The line names the entry, and which there are only where one is unknown."""
     with pytest.raises(ConfigError) as caught:
         load_robot(_write(tmp_path, text))
     assert found in str(caught.value)
+    assert ('the keys [' in str(caught.value)) is ('unknown key' in found)
     assert '\n' not in str(caught.value)
 
 
