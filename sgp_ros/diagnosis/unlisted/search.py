@@ -60,12 +60,11 @@ from sgp_ros.physics.effect_at import EffectAt
 SMOOTH, SHAPES, FIRST, FITTED = 3, 4, 12, 5
 """Smooth forces fitted beside each choice of kept effects; of all of these, those for which
 formulas are tried; texts that become formulas for the best one, and for each other."""
+MULTIPLIED, EARNED = 3, 3
+"""Best models with a formula: those whose formula is tried as a factor; those in which every
+listed effect must earn its price again."""
 WEIGHT_STEPS = (0.25, 0.12, 0.06, 0.03, 0.015)
 """By which the weight of a joint that is added is refined, in parts of itself."""
-MULTIPLIED = 3
-"""Best models with a formula, whose formula is tried as a factor."""
-EARNED = 3
-"""Best models with a formula in which every listed effect must earn its price again."""
 
 
 def search(
@@ -101,7 +100,7 @@ def search(
             if key not in laws or scale.worth(law) > scale.worth(laws[key]):
                 laws[key] = law
     ranked = look.best(laws.values())
-    if ranked and scale.excess(ranked[0])[joint] > 1.0:
+    if ranked and look.leaves_some(ranked[0]):
         products = look.products(ranked)
         smooth = look.best([*smooth, *products])
         ranked = look.best([*ranked, *(x for m in products for x in look.formulas(m, FITTED))])
@@ -111,12 +110,11 @@ def search(
     ranked = ranked[next(first, 0) :]
     ranked[:1] = [refined(look.columns, scale, m, joint) for m in ranked[:1]]
     free = look.free(ranked[0]) if ranked else np.zeros(0)
-    floor = float(scale.power[joint] * scale.floor[joint])
     if not (is_better or any(leaves_less(m, listed, joint) for m in ranked[:1])):
         return None
     if any(scale.worth(m) > scale.worth(listed) + ALIKE for m in ranked[:1]):
         slight = slight and is_slight(listed, ranked[0], joint)
-    return Searched(joint, listed, smooth[0], tuple(ranked), free, floor, slight)
+    return Searched(joint, listed, smooth[0], tuple(ranked), free, look.floor, slight)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,10 +165,8 @@ class _Look:
 
         They are tried only where listed effects are beaten, or leave the joint unexplained.
         """
-        floor = float(self.scale.power[self.joint] * self.scale.floor[self.joint])
         is_beaten = self.scale.worth(best) > self.scale.worth(self.listed) + ALIKE
-        is_left = best.mean_square[self.joint] > CLEARER * floor
-        if not (is_left and (self.is_open or is_beaten)):
+        if not (self.leaves_some(best) and (self.is_open or is_beaten)):
             return
         placed = smooth_of(best, self.joint)[0]
         bases = [tuple(s for s in best.effects if s is not placed), self._others()]
@@ -181,6 +177,15 @@ class _Look:
             alike = [e for e in effects if e.gate or not any(e.variable.is_of(s) for s in own)]
             for model in list(self._fitted(base, alike, SMOOTH)):
                 yield self._with_weight(base, model)
+
+    @property
+    def floor(self) -> float:
+        """Mean square that errors of signals may leave of the joint."""
+        return float(self.scale.power[self.joint] * self.scale.floor[self.joint])
+
+    def leaves_some(self, model: Model) -> bool:
+        """Return whether a model leaves clearly more of the joint than that."""
+        return bool(model.mean_square[self.joint] > CLEARER * self.floor)
 
     def products(self, laws: list[Model]) -> list[Model]:
         """Return the best model with a smooth force times a formula of another variable."""
@@ -193,22 +198,17 @@ class _Look:
 
     def _with_weight(self, base: Model, model: Model) -> Model:
         """Return a model with the best weight of a joint that is added in its smooth force."""
-        motion = self.columns.equations(frozenset()).motion
-        _, force = smooth_of(model, self.joint)
-        variable = force.variable
-        if not variable.is_weighted:
-            return model
-        assert variable.other is not None
-        best, (other, _, weight) = model, variable.other
-        for step in WEIGHT_STEPS:
-            near = [weighted(motion, self.joint, other, variable.kind, weight * x, force.gate)
-                    for x in (1.0 - step, 1.0 + step)]  # fmt: skip
+        motion, best = self.columns.equations(frozenset()).motion, model
+        force = smooth_of(model, self.joint)[1]
+        for step in WEIGHT_STEPS if force.variable.is_weighted else ():
+            added = smooth_of(best, self.joint)[1].variable.other
+            assert added is not None
+            weights = [added[2] * x for x in (1.0 - step, 1.0 + step)]
+            near = [weighted(motion, self.joint, added[0], force.variable.kind, w, force.gate)
+                    for w in weights]  # fmt: skip
             for found in self._fitted(base, near, None):
                 if self.scale.worth(found) > self.scale.worth(best):
                     best = found
-            chosen = smooth_of(best, self.joint)[1].variable.other
-            assert chosen is not None
-            weight = chosen[2]
         return best
 
     def free(self, model: Model) -> np.ndarray:
@@ -264,10 +264,9 @@ class _Look:
         base = self._without(kept, is_free=smooth.is_free)
         known = chosen.key, frozenset(s.key for s in kept)
         if known not in self.followed:  # other bodies hardly change what follows it
-            scale, rows = self.scale, len(smooth.residual)
-            floor = rows * scale.power[self.joint] * scale.floor[self.joint]
+            floor = len(smooth.residual) * self.floor
             motion, curve = smooth.frame.equations.motion, curve_of(smooth, self.joint)
-            self.followed[known] = list(formulas(chosen, motion, curve, float(floor), count))
+            self.followed[known] = list(formulas(chosen, motion, curve, floor, count))
         laws = self.followed[known][:count]
         yield from self._fitted(base, laws, None)
 

@@ -66,20 +66,21 @@ class LawAsFactor:
     unit: str
 
     @classmethod
-    def of(cls, law: EffectAt, variable: Variable) -> LawAsFactor | None:
-        """Return a law as a factor; None for one of several coefficients."""
+    def of(cls, law: EffectAt, variable: Variable, gate: str = '') -> LawAsFactor | None:
+        """Return a law without its gate as a factor; None for one of several coefficients."""
         effect = law.effect
         assert isinstance(effect, FormulaLaw)
         text, found = effect.law.text, zip(effect.shape_names(), law.shape.tolist(), strict=True)
-        if effect.linear != ('a',) or not text.startswith('a*'):
+        if effect.linear != ('a',) or not (text.startswith('a*') and text.endswith(gate)):
             return None
+        formula = read_formula(_renamed(text.removeprefix('a*').removesuffix(gate)), is_law=True)
         numbers = effect.known | dict(found)
         parameters = [
             replace(p, name=_renamed(p.name), start=numbers[p.name])
-            for p in effect.quantities if isinstance(p, LawParameter) and p.name in numbers
-        ]  # fmt: skip
+            for p in effect.quantities
+            if isinstance(p, LawParameter) and _renamed(p.name) in formula.parameters
+        ]
         (coefficient,) = effect.coefficient_quantities()
-        formula = read_formula(_renamed(text.removeprefix('a*')), is_law=True)
         return cls(FormulaLaw(formula, effect.joint, parameters), variable, coefficient.unit)
 
     @property

@@ -204,13 +204,19 @@ def without_limits(ranked: Sequence[Model], scale: Scale, joint: int) -> list[Mo
 def as_factor(
     model: Model, joint: int
 ) -> Iterator[tuple[LawAsFactor, tuple[EffectAt, ...]]]:  # fmt: skip
-    """Yield the formula of a model at a joint as a factor, if it can be one, and all others."""
+    """Yield the formula of a model at a joint as a factor, if it can be one, and all others.
+
+    Of friction that changes with a position, too, for another form of friction.
+    """
     law = law_of(model, joint)
     assert law is not None
     assert isinstance(law.effect, FoundLaw)
-    factor = LawAsFactor.of(law, law.effect.smooth.variable)
-    if factor is not None:
-        yield factor, tuple(s for s in model.effects if s is not law)
+    smooth, others = law.effect.smooth, tuple(s for s in model.effects if s is not law)
+    gates = ['', f'*{smooth.factor}'] if smooth.gate in {'sign', 'soft'} else ['']
+    for gate in gates:
+        factor = LawAsFactor.of(law, smooth.variable, gate)
+        if factor is not None:
+            yield factor, others
 
 
 def times_law(motion: ObservedMotion, joint: int, factor: LawAsFactor) -> Iterator[SmoothForce]:
@@ -218,6 +224,6 @@ def times_law(motion: ObservedMotion, joint: int, factor: LawAsFactor) -> Iterat
     names = motion.tree.moving_names
     for i, kind in itertools.product(motion.moving_joints, ('q', 'dq')):
         variable = Variable(kind, i, names[i])
-        if variable != factor.variable:
+        if (kind, names[i]) not in factor.law.law.signals:  # it would be a function of it alone
             knots = variable.knots(motion, PIECES)
             yield SmoothForce(joint, variable, LAW, knots, names[joint], known=factor)

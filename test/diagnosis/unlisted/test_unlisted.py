@@ -37,6 +37,7 @@ from sgp_ros.diagnosis.unlisted.shapes import (
     SmoothForce,
 )
 from sgp_ros.diagnosis.unlisted.tried import (
+    as_factor,
     is_series,
     more_forces,
     promises,
@@ -440,6 +441,18 @@ def test_a_law_of_one_coefficient_may_be_a_factor(equations_for, perfect):
     for smooth in times_law(motion, 1, found):
         assert smooth.variable != some.variable
         assert smooth.factors(motion) == pytest.approx(found.values(motion))
+    soft = next(s for s in smooth_forces(motion, 1) if s.variable == some.variable
+                and s.gate == 'soft')  # fmt: skip
+    law = a_law(soft, motion, seen, 'a*exp(X/w0)', {'w0': 0.7})
+    place, shape = law.places(motion)[0], np.array([0.7, 0.2])
+    model = SimpleNamespace(effects=(EffectAt(law, place, shape, np.ones(1)),))
+    gated, plain = (f for f, _ in as_factor(model, 1))
+    assert 'tanh' in gated.law.law.text
+    assert plain.law.law.text == 'exp(q[joint0]/w0_f)'
+    assert [p.name for p in plain.parameters] == ['w0_f']
+    own = Variable('dq', 1, 'joint1')
+    assert own not in {s.variable for s in times_law(motion, 1, gated)}
+    assert own in {s.variable for s in times_law(motion, 1, plain)}
     assert shapes._renamed('x0*q[x0] + v_s*q["r"]*r') == 'x0_f*q[x0] + v_s_f*q["r"]*r_f'
 
 
