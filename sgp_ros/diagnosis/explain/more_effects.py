@@ -84,16 +84,13 @@ def _richer(columns: Columns, models: list[Model]) -> list[Model]:
 
 
 def _everyday(columns: Columns, best: Model, sigma: np.ndarray) -> Iterator[Model]:
-    """Yield the laws that nearly every joint has, in place of any rarer one, and beside those.
+    """Yield the laws that nearly every joint has, however small, in place of those found.
 
-    However small they are: a number of another law bends to one that is left out.
+    Those of one joint may be all that was looked for while others lack some, too.
     """
-    rare = tuple(s for s in best.effects if not s.effect.is_usual)
     for is_free in (False, True) if best.effects else ():
-        base = fit(columns, (), sigma, is_free=is_free)
-        for beside in dict.fromkeys([(), rare]):
-            model = usual(columns, base, beside, least=0.0)
-            yield from filter(is_credible, [without_vain(columns, model)])
+        model = usual(columns, fit(columns, (), sigma, is_free=is_free), least=0.0)
+        yield from filter(is_credible, [without_vain(columns, model)])
 
 
 def _carrying(columns: Columns, models: list[Model]) -> list[Model]:

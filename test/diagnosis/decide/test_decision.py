@@ -276,7 +276,7 @@ def test_small_everyday_laws_stand_beside_larger_ones(equations_for):
     """Two laws of one joint leave little; the friction of the other is worth it all the same."""
     world = simulate(
         CHAINS[2], 8, 12.0,
-        force=lambda t, q, v: (-0.5 * v[0] - 0.8 * math.sin(3.0 * q[0]), -0.02 * v[1]),
+        force=lambda t, q, v: (-0.5 * v[0] - 0.4 * math.tanh(50.0 * v[0]), -0.005 * v[1]),
     )  # fmt: skip
     equations = equations_for(world)[1]
     comparison = compare_models(equations, lambda _share: None)
