@@ -48,9 +48,8 @@ def _moved_again(folder, simulated, seconds):
     return truth['position'][:count], moved
 
 
-@pytest.mark.parametrize(
-    'robot', ['reaction_wheel', pytest.param('linear_axis', marks=pytest.mark.long)]
-)
+@pytest.mark.long
+@pytest.mark.parametrize('robot', ['reaction_wheel', 'linear_axis'])
 def test_a_simulated_robot_is_the_one_of_its_name(tmp_path, robot):
     """Back-EMF, dry friction and offset of the truth are all in the nominal model."""
     assert _diagnosed(tmp_path, robot, robot)['verdict'] == 'no_mismatch'

@@ -49,6 +49,7 @@ def _replayed(folder, bag, out, *options):
     return json.loads((out / 'overlay.json').read_text())['recordings']
 
 
+@pytest.mark.long
 def test_the_machine_follows_its_recording_and_the_model_does_not(folder, tmp_path, capsys):
     """Errors, series, page and a recording on the clock of the first one."""
     bag = folder / 'machine.mcap'

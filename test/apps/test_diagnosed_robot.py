@@ -131,13 +131,13 @@ def test_a_stated_payload_is_no_part_of_the_bodies_that_are_written(tmp_path):
     entry = '{mass: {value: 0.5}, x: {value: 0.0}, y: {value: 0.0}, z: {value: -0.2}}'
     (tmp_path / 'nominal.urdf').write_text(URDF)
     path = tmp_path / 'nominal.yaml'
-    last = read_urdf(URDF).moving_names[-1]
-    path.write_text(f'schema: 1\nurdf: nominal.urdf\neffects: [{{effect: payload, joint: {last}, '
+    (last,) = (tree := read_urdf(URDF)).outermost
+    joint = tree.moving_names[last]
+    path.write_text(f'schema: 1\nurdf: nominal.urdf\neffects: [{{effect: payload, joint: {joint}, '
                     f'parameters: {entry}}}]\n')  # fmt: skip
     nominal = nominal_model(load_robot(str(path)))
-    assert nominal.tree.parameters[len(nominal.tree.moving_names) - 1, 0] == pytest.approx(
-        nominal.plain.parameters[len(nominal.tree.moving_names) - 1, 0] + 0.5
-    )
+    mass = nominal.plain.parameters[last, 0]
+    assert nominal.tree.parameters[last, 0] == pytest.approx(mass + 0.5)
     np.testing.assert_allclose(
         nominal.without_stated(nominal.tree.parameters), nominal.plain.parameters, atol=1e-12
     )

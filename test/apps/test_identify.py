@@ -353,6 +353,7 @@ def test_targets_become_efforts_by_their_gains(swing, tmp_path):
     assert found['body_1.mz'] == pytest.approx(-1.5 * 0.2, abs=0.003)
 
 
+@pytest.mark.long
 def test_a_wrong_connection_is_said_before_bodies_are_estimated(swing, tmp_path, capsys):
     """A recording that contradicts the robot is checked as it is before a diagnosis."""
     with RecordingWriter(tmp_path / 'turned.mcap') as writer:

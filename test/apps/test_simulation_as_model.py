@@ -40,6 +40,7 @@ def _diagnosed(machine, folder, armature, robot=''):
     return json.loads((out / 'diagnosis.json').read_text()), load_robot(str(out / YAML_NAME))
 
 
+@pytest.mark.long
 def test_machine_and_model_stand_side_by_side(machine, tmp_path):
     """More friction and less rotor than the file states; damping, which both have, is shared."""
     found, diagnosed = _diagnosed(machine, tmp_path, 0.03)

@@ -38,6 +38,7 @@ def _relative_error(fit, data):
     return np.sqrt(np.mean((data.y - mean) ** 2) / np.mean(data.y**2))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     'world',
     [{'force': 3.0}, {'force': 3.0, 'colour': 0.97}, {'force': 3.0, 'encoder': 1e-5}],

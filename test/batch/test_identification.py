@@ -51,6 +51,7 @@ def _coefficients(robot, *names):
     return [[c.name for c in robot.coefficients].index(name) for name in names]
 
 
+@pytest.mark.long
 def test_parameters_of_a_simulated_axis_lie_in_their_intervals():
     """With the motor's command held between samples, as a machine is driven."""
     found = identify(axis_signals(20.0), LINEAR_AXIS, {}, PHYSICS).physics.coefficients

@@ -30,6 +30,7 @@ def _least_squares(data):
     return w, np.linalg.norm(y - F @ w) / np.linalg.norm(y)
 
 
+@pytest.mark.long
 def test_the_equation_of_motion_survives_the_filter(signals):
     """The true coefficients explain the filtered force of a simulated axis to one per cent."""
     data = filtered_data(signals, LINEAR_AXIS, PLAN)

@@ -95,7 +95,8 @@ def light(tmp_path_factory):
     [
         (0.0, 0.0, 1.0, []),
         pytest.param(0.004, 0.0, 1.0, ['coulomb_friction'], marks=pytest.mark.long),
-        (0.004, 0.012, 1.01, ['coulomb_friction', 'quadratic_drag']),
+        pytest.param(0.004, 0.012, 1.01, ['coulomb_friction', 'quadratic_drag'],
+                     marks=pytest.mark.long),
     ],
 )  # fmt: skip
 def test_what_a_free_swing_loses_is_named(light, level, c, longer, named):

@@ -58,7 +58,7 @@ def diagnosed(robots):
 
 @pytest.mark.parametrize(
     'name',
-    [pytest.param(x, marks=pytest.mark.long) if x in {'viscous_friction', 'cogging'} else x
+    [x if x in {'coulomb_friction', 'command_delay'} else pytest.param(x, marks=pytest.mark.long)
      for x in PLANTED],
 )  # fmt: skip
 def test_planted_physics_is_named_with_its_numbers(diagnosed, name):
@@ -75,6 +75,7 @@ def test_planted_physics_is_named_with_its_numbers(diagnosed, name):
             assert parameter.unit
 
 
+@pytest.mark.long
 def test_a_delay_comes_with_how_long_commands_are_held(diagnosed):
     """Samples of a faster controller do not hold that long, which the log does not tell."""
     said = [r for r in diagnosed('command_delay').remarks if 'taken to hold' in r]

@@ -88,7 +88,7 @@ def test_forgetting_may_begin_between_two_samples(mode):
     assert np.all(np.array(stds[1]) > np.array(stds[0]))
 
 
-@pytest.mark.parametrize('mode', ['exact', 'basis'])
+@pytest.mark.parametrize('mode', ['basis', pytest.param('exact', marks=pytest.mark.long)])
 def test_fits_go_on_however_long_the_stream(mode):
     """Hyper-parameters are fitted long after the first sample has gone."""
     options = {'refit__period': 20, 'buffer__budget': 60, 'filter__hop': 0.01}

@@ -96,7 +96,8 @@ def test_added_dry_friction_is_part_of_the_true_coefficient():
     assert simulation.truth()['effects'][0]['parameters']['level'] == {'value': 5.0, 'unit': 'N'}
 
 
-@pytest.mark.parametrize('seed', [0, *(pytest.param(s, marks=pytest.mark.long) for s in (1, 2))])
+@pytest.mark.long
+@pytest.mark.parametrize('seed', range(3))
 def test_tracking_stays_near_its_reference(seed):
     """The axis moves by decimetres and never runs away."""
     recording = simulate(make_simulation('linear_axis', seed=seed), 20.0)

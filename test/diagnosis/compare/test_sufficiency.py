@@ -97,6 +97,7 @@ def test_a_joint_whose_efforts_are_noise_takes_nothing_from_the_others(robots, l
         assert found.verdict == 'no_mismatch'
 
 
+@pytest.mark.long
 def test_a_model_worse_than_a_constant_certifies_nothing(robots):
     """A robot that swings without effort: no effort varies that a model could explain."""
     world = simulate(CHAINS[1], 11, 6.0)

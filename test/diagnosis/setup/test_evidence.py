@@ -89,10 +89,8 @@ def test_beside_friction_rows_of_a_held_joint_say_nothing_of_it(slow):
     assert found.left[0] < 0.2 * probe.agreement(Correction.none(1), unknowns=2).left[0]
 
 
-@pytest.mark.parametrize(
-    ('periods', 'expected'),
-    [(0.7, []), pytest.param(2.0, ['clock_offset'], marks=pytest.mark.long)],
-)
+@pytest.mark.long
+@pytest.mark.parametrize(('periods', 'expected'), [(0.7, []), (2.0, ['clock_offset'])])
 def test_efforts_read_within_a_period_of_the_positions_have_no_other_clock(
     tmp_path, periods, expected
 ):
@@ -120,7 +118,7 @@ def test_noise_does_not_alias_where_rows_are_left_out(tmp_path):
     assert (left < 1.6 * inside / probe.power).all()
 
 
-@pytest.mark.parametrize('k', [1, 2])
+@pytest.mark.parametrize('k', [1, pytest.param(2, marks=pytest.mark.long)])
 def test_a_load_is_no_error_of_the_connection(tmp_path, k):
     """As heavy as the last link: a scale of the efforts would leave less to bodies."""
     *others, last = CHAINS[k]

@@ -67,7 +67,10 @@ def test_an_error_of_the_connection_is_found_with_its_numbers(case, key, numbers
     assert error.remedy
 
 
-@pytest.mark.parametrize('folder', ['practice2/cases/case_05', 'practice/cases/case_05'])
+@pytest.mark.parametrize(
+    'folder',
+    ['practice/cases/case_05', pytest.param('practice2/cases/case_05', marks=pytest.mark.long)],
+)
 def test_friction_is_no_error_of_the_connection(folder):
     assert not _found(*_raw(SHARED / folder))
 

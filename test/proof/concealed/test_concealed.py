@@ -182,13 +182,8 @@ def _answer(folder):
     return json.loads((folder / 'answers' / 'case_000.json').read_text(encoding='utf-8'))
 
 
-@pytest.mark.parametrize(
-    'only',
-    [
-        'viscous_friction',
-        *(pytest.param(x, marks=pytest.mark.long) for x in ('hysteresis', draw.PARAMETERS)),
-    ],
-)
+@pytest.mark.long
+@pytest.mark.parametrize('only', ['viscous_friction', 'hysteresis', draw.PARAMETERS])
 def test_the_true_structure_finds_the_true_numbers_and_predicts_what_was_held_out(drawn, only):
     """The simulation shares no code with it. Filters leave up to a thousandth of any robot."""
     folder = drawn(only)

@@ -46,6 +46,7 @@ DRY = ('a', [['asymmetric_coulomb'], ['coulomb_friction', 'constant_load']], Tru
 ROTOR = ('b', [['armature']], False)
 
 
+@pytest.mark.long
 def test_a_machine_is_a_function_of_its_seed(drawn):
     """Its robot, what it conceals, and its recordings."""
     texts = [(f / 'answers/case_001.json').read_text(encoding='utf-8') for f in drawn]

@@ -43,6 +43,7 @@ def samples(tmp_path_factory):
     return files.make_samples(tmp_path_factory.mktemp('samples'))
 
 
+@pytest.mark.long
 def test_intact_files_are_read(samples):
     for kind, path in samples.items():
         files.read(kind, path)
