@@ -123,6 +123,10 @@ Convention."""
 NEARLY = 1.0 / 3.0
 """A force without form leaves less than this part of what laws leave that say only nearly what
 there is [1]. Convention."""
+LAW_REST = 1e-3
+"""Greatest rest that comes back with the motion beside a formula, relative to its force: 3 % of
+it [1]. A form that the data chose has no error of form. Convention.
+"""
 LACKING = 1.5
 """Greatest ratio of what a formula leaves to what a spline that follows any law does, if it is
 not chance at `SIGNIFICANT` [1]. Convention."""

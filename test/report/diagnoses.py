@@ -133,7 +133,7 @@ def _overlay(time, position, before, after):
     )  # fmt: skip
 
 
-def search(why_not='the best formula follows the shape only approximately'):
+def search(why_not='the best formula follows the force only approximately'):
     """Return a search at `elbow` that ended with friction over a place."""
     x = np.linspace(-1.0, 1.0, 41)
     shape, beyond = 0.2 + 0.1 * x**2, np.linspace(-2.0, 2.0, 82)

@@ -88,7 +88,7 @@ def test_motion_is_shown_beside_efforts_with_its_errors_in_degrees():
     assert 0.4 < np.isfinite(nominal).mean() < 0.6
 
 
-@pytest.mark.parametrize('why_not', ['', 'the best formula follows the shape only approximately'])
+@pytest.mark.parametrize('why_not', ['', 'the best formula follows the force only approximately'])
 def test_the_search_for_a_law_is_drawn_and_said(why_not):
     """Data, shape with its band, formulas; asserted or not, and never both."""
     found = diagnosis('unexplained', [UNKNOWN])

@@ -16,9 +16,16 @@ from itertools import combinations
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import ALIKE, LACKING, LEAST_LAW, NEARLY, SIGNIFICANT
+from sgp_ros.diagnosis.criteria import (
+    ALIKE,
+    LACKING,
+    LAW_REST,
+    LEAST_LAW,
+    NEARLY,
+    SIGNIFICANT,
+)
 from sgp_ros.diagnosis.decide.certainty import probabilities
-from sgp_ros.diagnosis.decide.cross_validation import structure
+from sgp_ros.diagnosis.decide.cross_validation import repeatable, structure
 from sgp_ros.diagnosis.decide.decision import Decision, decide, refused
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, moved
 from sgp_ros.diagnosis.decide.scale import Scale
@@ -238,11 +245,10 @@ def _objection(equations: Equations, comparison: Comparison, searched: Searched)
     best, scale = searched.laws[0], Scale.of(equations, comparison).of_forms()
     if scale.worth(best) < scale.worth(searched.smooth):
         return 'no formula tried stays within the 95 % band of the shape'
-    ratio, chance = searched.lack_of_fit
-    if ratio > LACKING and chance < SIGNIFICANT:
-        return 'the best formula follows the shape only approximately'
-    law = law_of(best, searched.joint)
+    law, (ratio, chance) = law_of(best, searched.joint), searched.lack_of_fit
     assert law is not None
+    if (ratio > LACKING and chance < SIGNIFICANT) or _leaves_more(equations, best, law):
+        return 'the best formula follows the force only approximately'
     motion = equations.motion
     if law.at_bounds(motion):
         return 'a parameter of the best formula is at the limit of what this motion determines'
@@ -250,6 +256,15 @@ def _objection(equations: Equations, comparison: Comparison, searched: Searched)
         return 'other bodies, or other lengths, than those of the robot file would act much alike'
     wide = law.force(moved(motion, np.inf, 1.0, 0.0))
     return '' if np.isfinite(wide).all() else 'the best formula is not finite over the range'
+
+
+def _leaves_more(equations: Equations, model: Model, law: EffectAt) -> bool:
+    """Return whether a law leaves more of its force than that of a chosen form may."""
+    joint = law.place.joint
+    asked = np.arange(equations.d.shape[1]) == joint
+    share = float(repeatable(equations, model.residual, asked)[0, joint])
+    force = model.forces[[s is law for s in model.effects].index(True)][:, joint]
+    return share * float(model.mean_square[joint]) > LAW_REST * float((force**2).mean())
 
 
 def _doubt(

@@ -10,7 +10,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.criteria import ALIKE, COUNTED_SHARE, LACKING, SIGNIFICANT
+from sgp_ros.diagnosis.criteria import (
+    ALIKE,
+    COUNTED_SHARE,
+    LACKING,
+    LAW_REST,
+    SIGNIFICANT,
+)
 from sgp_ros.diagnosis.decide.decision import Decision, decide
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
@@ -529,6 +535,20 @@ def test_laws_of_two_joints_are_found_together(equations_for):
         law = law_of(found.decision.model, joint)
         expected = sign * 0.6 * np.cos(motion.position[:, 1]) * motion.velocity[:, 1 - joint]
         np.testing.assert_allclose(law.force(motion)[:, joint], expected, atol=0.02)
+
+
+@pytest.mark.parametrize(('left', 'share', 'is_more'), [(0.9, 1.0, False), (1.1, 1.0, True),
+                                                        (1.1, 0.5, False)])  # fmt: skip
+def test_a_formula_leaves_little_that_comes_back_with_the_motion(
+    monkeypatch, left, share, is_more
+):
+    """Relative to its force; noise beside it may be larger."""
+    monkeypatch.setattr(assertion, 'repeatable', lambda *_: np.array([[share], [1.0]]))
+    law, force = SimpleNamespace(place=Place(0)), np.full((5, 1), 2.0)
+    model = SimpleNamespace(effects=(law,), forces=(force,), residual=None,
+                            mean_square=np.array([4.0 * LAW_REST * left]))  # fmt: skip
+    equations = SimpleNamespace(d=np.zeros((5, 1)))
+    assert assertion._leaves_more(equations, model, law) is is_more
 
 
 def test_what_is_unknown_at_two_joints_is_looked_for_beside_everyday_laws(equations_for):
