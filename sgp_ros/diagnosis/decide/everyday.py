@@ -124,7 +124,7 @@ def widened(
         return found
     more = usual(columns, model, model.effects, least=0.0)
     plain = [dict(std) for std in found]
-    for whole in (more, _falling(columns, more)):
+    for whole in dict.fromkeys([more, _falling(columns, more)]):
         beside = zip(whole.effects, reported_std(whole, columns), strict=True)
         now = {s.key: (s.report(motion), std) for s, std in beside}
         for s, std, own in zip(model.effects, found, plain, strict=True):
@@ -141,7 +141,7 @@ def _falling(columns: Columns, model: Model) -> Model:
     """Return a model with friction that falls with speed in place of Coulomb friction."""
     motion, law = model.frame.equations.motion, STRIBECK_FRICTION
     steady = {i for i, s in enumerate(model.effects) if s.effect is not COULOMB_FRICTION}
-    while True:
+    while len(steady) < len(model.effects):
         effects = tuple(
             s if i in steady
             else EffectAt(law, s.place, np.median(law.starts(motion, s.place), axis=0))
@@ -152,6 +152,7 @@ def _falling(columns: Columns, model: Model) -> Model:
         if not wrong:
             return trial
         steady |= wrong
+    return model
 
 
 def _standing(equations: Equations, model: Model, joint: int) -> dict[EffectAt, float]:

@@ -179,9 +179,7 @@ def _decided(
     return replace(found, decision=decision, why_not=found.why_not | {searched.joint: why})
 
 
-def _rivals(
-    equations: Equations, best: Model, waiting: Sequence[Searched]
-) -> Iterator[Model]:  # fmt: skip
+def _rivals(equations: Equations, best: Model, waiting: Sequence[Searched]) -> Iterator[Model]:
     """Yield a model with other formulas in place of those of the joints that are waiting."""
     columns = Columns(equations)
     for searched in waiting:
