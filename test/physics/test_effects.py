@@ -492,6 +492,7 @@ def test_a_payload_is_a_point_mass_on_an_outermost_link():
     """Its force at rest is the gradient of its height times its weight."""
     rest = replace(MOTION, velocity=np.zeros((ROWS, 4)), acceleration=np.zeros((ROWS, 4)))
     offset = np.array([0.1, -0.05, -0.2])
+    assert EFFECTS['payload'].places(rest) == [Place(j) for j in TREE.outermost]
     x = columns('payload', TREE.outermost[0], [0.7, *offset], motion=rest)[:, :, 0]
     for j in range(TREE.size):
         h = np.zeros(TREE.size)

@@ -272,6 +272,18 @@ def test_a_law_of_two_joints_is_unknown_where_one_of_them_is():
     assert excess(-1, acts_on_it=True) == [0.1, 3.0, 0.2]
 
 
+def test_friction_of_two_joints_goes_where_one_is_unknown(half_known):
+    place, law = Place(1, source=0), EFFECTS['coupled_friction']
+    start = law.starts(half_known.motion, place)[0]
+    base = fitted(half_known)
+    model = fit(Columns(half_known), (EffectAt(law, place, start),), base.sigma, is_free=False)
+    comparison = _comparison(half_known, model)
+    scale = Scale.of(half_known, comparison)
+    found = _opened(half_known, scale, comparison, model, (), np.array([3.0, 0.1]))
+    assert set(found.unknown) == {0, 1}
+    assert found.model.effects == ()
+
+
 def test_small_everyday_laws_stand_beside_larger_ones(equations_for):
     """Two laws of one joint leave little; the friction of the other is worth it all the same."""
     world = simulate(
