@@ -55,7 +55,7 @@ from sgp_ros.diagnosis.reference import (
 from sgp_ros.diagnosis.result import Diagnosis, Proof
 from sgp_ros.diagnosis.setup.said import doubted_scales
 from sgp_ros.diagnosis.shown import Predictions, Traces
-from sgp_ros.diagnosis.wrong_bodies import parameter_errors
+from sgp_ros.diagnosis.wrong_bodies import parameter_errors, traded_remarks
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event
 from sgp_ros.errors import NumericalError
@@ -158,7 +158,8 @@ def _diagnosed(
     findings = doubted(findings, vain, tree.moving_names)
     verdict = verdict_of(decision, wrong, connected.findings, *connected.left, lags or differ)
     hidden = hides_friction(equations, comparison, decision) if verdict in _CALM else ()
-    remarks = (*bound_remarks(decision), *on_z, *chain(*doubts.values()), *hidden)
+    traded = traded_remarks(whole, model, recordings.unstated)
+    remarks = (*bound_remarks(decision), *on_z, *chain(*doubts.values()), *hidden, *traded)
     is_doubted = bool(hidden) or rests_on(doubts, findings, tree.moving_names)
     return Diagnosis(
         robot=robot,

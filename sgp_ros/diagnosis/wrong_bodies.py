@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import ALIKE, NUMBER_ERROR, PER_PARAMETER
+from sgp_ros.diagnosis.criteria import ALIKE, EVIDENCE, NUMBER_ERROR, PER_PARAMETER
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.result import ParameterError
 
@@ -27,9 +27,66 @@ def parameter_errors(
         unstated: bodies that the robot's file leaves open: nothing that was stated is wrong.
         other: of another machine, from which they differ; None for the nominal robot.
     """
-    tree = equations.motion.tree
     if not model.is_free:
         return ()
+    numbers, _ = _numbers(equations, model, unstated, other)
+    return tuple(filter(_differs, numbers))
+
+
+def traded_remarks(
+    equations: Equations, model: Model, unstated: Collection[int] = ()
+) -> Iterator[str]:
+    """Yield sentences on numbers that must differ beside those above, if the rest is as stated.
+
+    Numbers of several bodies may do the same, so that none is known by itself. Of changes
+    `x ~ N(x_hat, C)`, a set u costs `x_u' C_uu^-1 x_u / 2` nats if it stays as stated, and the
+    others are then `x_hat - C_u C_uu^-1 x_u` [source: conditional normal distribution]. What a
+    number saves must be worth `EVIDENCE`.
+    """
+    if not model.is_free:
+        return
+    numbers, C = _numbers(equations, model, unstated)
+    unit = np.sqrt(np.maximum(np.diag(C), 1e-300))
+    x, C = np.array([e.value - e.nominal for e in numbers]) / unit, C / np.outer(unit, unit)
+    held = [i for i, e in enumerate(numbers) if not _differs(e) and unit[i] > 1e-150]
+    while held:
+        costs = {i: _cost(x, C, [u for u in held if u != i]) for i in held}
+        least = min(costs.values())
+        if _cost(x, C, held) < least + EVIDENCE:
+            return
+        alike = [i for i in held if costs[i] < least + PER_PARAMETER]
+        told = []
+        for i in alike:
+            others = [u for u in held if u != i]
+            solved = np.linalg.lstsq(C[np.ix_(others, others)], C[others, i], rcond=None)[0]
+            now = numbers[i].nominal + float((x[i] - solved @ x[others]) * unit[i])
+            e = numbers[i]
+            told.append(f'{e.parameter} of {e.link} {now:.3g} instead of {e.nominal:.3g} {e.unit}')
+        yield (
+            f'Bodies differ in one more number, which this motion cannot place. If all others '
+            f'are as stated, it is {" or ".join(told)}.'
+        )
+        held.remove(min(costs, key=lambda i: costs[i]))
+
+
+def _cost(x: np.ndarray, C: np.ndarray, held: list[int]) -> float:
+    """Return what it costs that some numbers are as stated [nats]."""
+    solved = np.linalg.lstsq(C[np.ix_(held, held)], x[held], rcond=None)[0]
+    return 0.5 * float(x[held] @ solved)
+
+
+def _differs(e: ParameterError) -> bool:
+    return abs(e.value - e.nominal) > max(2.0 * e.std, 1e-9)
+
+
+def _numbers(
+    equations: Equations, model: Model, unstated: Collection[int], other: Model | None = None
+) -> tuple[list[ParameterError], np.ndarray]:
+    """Return masses and centres of all bodies, (n,), and the covariance of what they are, (n, n).
+
+    Arguments are those of `parameter_errors`.
+    """
+    tree = equations.motion.tree
     if other is None:
         (w, C), stated = _changed(model), tree.parameters
     else:
@@ -37,7 +94,7 @@ def parameter_errors(
         stated = equations.with_bodies(equations.motion, other.w).tree.parameters
     changed = equations.with_bodies(equations.motion, w).tree.parameters
     D = equations.directions.reshape(len(C), -1, 10)
-    found = []
+    numbers, S = [], []
     for body, link in enumerate(tree.link_names):
         before, after = stated[body], changed[body]
         if after[0] <= 0.0 or before[0] <= 0.0 or body in unstated:
@@ -54,9 +111,10 @@ def parameter_errors(
         for name, (now, then, unit) in values.items():
             std = float(np.sqrt(max(float(slopes[name] @ C @ slopes[name]), 0.0)))
             std = float(np.hypot(std, NUMBER_ERROR * abs(now - then)))
-            if abs(now - then) > 2.0 * std and abs(now - then) > 1e-9:
-                found.append(ParameterError(link, name, float(now), std, float(then), unit))
-    return tuple(found)
+            numbers.append(ParameterError(link, name, float(now), std, float(then), unit))
+            S.append(slopes[name])
+    S = np.reshape(S, (-1, len(C)))
+    return numbers, np.asarray(S @ C @ S.T)
 
 
 def _changed(model: Model) -> tuple[np.ndarray, np.ndarray]:

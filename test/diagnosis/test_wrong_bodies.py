@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import pytest
 
-from sgp_ros.diagnosis.wrong_bodies import parameter_errors
+from sgp_ros.diagnosis.wrong_bodies import parameter_errors, traded_remarks
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, simulate
 
@@ -37,3 +38,23 @@ def test_two_wrong_bodies_are_not_told_as_one(equations_for):
     model = fitted(equations, is_free=True)
     alone = [e for e in parameter_errors(equations, model) if e.std < 1e-3 * abs(e.value)]
     assert not alone
+
+
+def test_numbers_that_trade_are_told_as_such(equations_for):
+    """A heavier second body, or one with its centre further out, and a first one like it."""
+    first, second = CHAINS[2]
+    chain = replace(first, mass=1.5 * first.mass), replace(second, centre=1.3 * second.centre)
+    _, equations = equations_for(simulate(chain, 5))
+    names = equations.motion.tree.link_names
+    (said,) = traded_remarks(equations, fitted(equations, is_free=True))
+    centre = re.search(f'com_z of {names[1]} -([0-9.]+) instead of -0.15 m', said)
+    assert float(centre.group(1)) == pytest.approx(chain[1].centre, rel=0.02)
+    assert f'mass of {names[1]}' in said
+
+
+def test_bodies_that_one_explains_trade_with_none(equations_for):
+    """One body with a shifted centre is told by itself, without a remark."""
+    first, second = CHAINS[2]
+    chain = first, replace(second, centre=1.2 * second.centre)
+    _, equations = equations_for(simulate(chain, 5))
+    assert not [*traded_remarks(equations, fitted(equations, is_free=True))]
