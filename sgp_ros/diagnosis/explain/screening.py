@@ -22,6 +22,8 @@ TRIALS = 2
 """Shapes per effect and place that are worth a fit."""
 _NEAR = 0.05
 """Change of the bodies with which columns need not be made anew [standard deviations]."""
+_DEPENDENT = 1e-6
+"""Ratio of singular values from which columns are linearly dependent [1]."""
 WIDEST = 0.75
 """Widest interval of position, as a share of the range, that is a region."""
 
@@ -116,8 +118,12 @@ def are_apart(effects: Sequence[EffectAt], motion: ObservedMotion) -> bool:
     """Return whether waves of one law at one place differ by one period or more in the motion.
 
     The two motors of a differential turn with the sum of its joints, and with their difference.
+    Two laws that hold the same plain law, such as friction that differs with direction and
+    Stribeck friction, have no numbers of their own.
     """
     for i, s in enumerate(effects):
+        if any(_overlap(s, o, motion) for o in effects[:i]):
+            return False
         first = replace(s.place, number=0)
         others = [o for o in effects[:i] if _is_like(o, s.effect, first)]
         wave = s.effect.wave(motion, s.place) if others else None
@@ -126,6 +132,17 @@ def are_apart(effects: Sequence[EffectAt], motion: ObservedMotion) -> bool:
         if wave and any(abs(o.shape[0] - s.shape[0]) < wave.width for o in others):
             return False
     return True
+
+
+def _overlap(a: EffectAt, b: EffectAt, motion: ObservedMotion) -> bool:
+    """Return whether two laws of one joint are linearly dependent, by a plain law in both."""
+    is_alone = a.place == b.place and a.place.source < 0 and a.effect is not b.effect
+    if not (is_alone and set(a.effect.plain) & set(b.effect.plain)):
+        return False
+    columns = [s.columns(motion) for s in (a, b)]
+    X = np.hstack([x if x.ndim == 2 else x[:, a.place.joint] for x in columns])
+    values = np.linalg.svd(X / np.maximum(np.abs(X).max(axis=0), 1e-300), compute_uv=False)
+    return bool(values[-1] < _DEPENDENT * values[0])
 
 
 @dataclass(frozen=True, eq=False)

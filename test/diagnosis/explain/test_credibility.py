@@ -16,6 +16,7 @@ from sgp_ros.diagnosis.explain.credibility import (
     slight_rest,
 )
 from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.diagnosis.explain.screening import are_apart
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
@@ -106,3 +107,16 @@ def test_a_ripple_is_not_seen_where_a_joint_turns_back_in_the_same_places(
     swinging = replace(long_swing, motion=replace(motion, position=position))
     ripple = EffectAt(EFFECTS['cogging'], Place(0), np.array([4.0 * np.pi * 6.0]))
     assert shows_waves(ripple, swinging) == shown
+
+
+@pytest.mark.parametrize(
+    ('other', 'credible'), [('asymmetric_coulomb', False), ('constant_load', True)]
+)
+def test_two_laws_that_hold_the_same_plain_one_have_no_numbers(
+    equations_for, perfect, other, credible
+):
+    """What differs with direction beside friction that falls is a constant load there."""
+    _, equations = equations_for(perfect[1])
+    both = [EffectAt(EFFECTS['stribeck_friction'], Place(0), np.array([0.1])),
+            EffectAt(EFFECTS[other], Place(0))]  # fmt: skip
+    assert are_apart(both, equations.motion) == credible
