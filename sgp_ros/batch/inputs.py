@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from sgp_ros.batch.fit import OfflineOptions, fit_offline
 from sgp_ros.batch.regression_data import FilteredData
@@ -98,7 +98,7 @@ def _chosen(squares: np.ndarray) -> np.ndarray:
     count = gain.shape[1]
     doubt = gain.std(axis=1, ddof=1) * np.sqrt(count)
     level = _LEVEL / (len(CANDIDATES) - 1)  # Bonferroni
-    is_better = gain.sum(axis=1) > stats.t.ppf(1.0 - level, count - 1) * doubt
+    is_better = gain.sum(axis=1) > special.stdtrit(count - 1, 1.0 - level) * doubt
     is_better &= total < (1.0 - _LEAST_GAIN) * total[0]
     is_better[0] = True
     errors = np.where(is_better, total, np.inf)

@@ -7,7 +7,7 @@ shrink with W: the likelihood of such a fit has no bound, but where other joints
 from __future__ import annotations
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from sgp_ros.batch.fit import FittedCoefficients
 from sgp_ros.batch.regression_data import FilteredData
@@ -64,4 +64,4 @@ def _is_found(
     size = np.sqrt(np.maximum(np.diag(spread), np.finfo(float).tiny))
     ratio = value / size
     square = float(ratio @ np.linalg.pinv(spread / np.outer(size, size)) @ ratio)
-    return square > float(stats.chi2.isf(_LEVEL, len(rows)))
+    return square > float(special.chdtri(len(rows), _LEVEL))

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from sgp_ros.campaign.mixed import MixedFit, fit_given, fit_mixed
 
@@ -60,7 +60,7 @@ def chance(t: float, dof: int, recordings: int, scans: int) -> float:
         scans: quantities times robots that are looked at.
     """
     tests = EQUIVALENT_TESTS * max(recordings / HORIZON, 1.0) * scans
-    return float(min(1.0, 2.0 * tests * stats.t.sf(abs(t), dof)))
+    return float(min(1.0, 2.0 * tests * special.stdtr(dof, -abs(t))))
 
 
 def best_step(fit: MixedFit, time: np.ndarray, robots: np.ndarray) -> Step | None:

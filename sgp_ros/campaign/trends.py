@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from sgp_ros.campaign.changes import Estimates, Step
 from sgp_ros.campaign.frame import Frame, Key, Series, frame_of, series_of
@@ -224,7 +224,7 @@ def _warm_up(problem: Estimates, age: np.ndarray) -> float | None:
 
 def _terms(fit: MixedFit, names: Sequence[str]) -> list[Term]:
     """Return the coefficients with their 95 % intervals; those without a name have none."""
-    half = float(stats.t.ppf(0.975, fit.dof)) * np.sqrt(np.diag(fit.covariance))
+    half = float(special.stdtrit(fit.dof, 0.975)) * np.sqrt(np.diag(fit.covariance))
     called = [*names, *[''] * (len(half) - len(names))]
     return [
         Term(name, float(b), float(b - h), float(b + h))

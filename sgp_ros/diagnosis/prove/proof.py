@@ -14,7 +14,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import spatial, stats
+from scipy import spatial, special
 
 from sgp_ros.batch.zero_phase import ZeroPhase
 from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
@@ -79,7 +79,7 @@ def _half_width(x: np.ndarray) -> float | None:
         return None
     means = np.array([part.mean() for part in np.array_split(x, blocks)])
     error = float(means.std(ddof=1)) / math.sqrt(blocks)
-    return float(stats.t.ppf(_LEVEL, blocks - 1)) * error
+    return float(special.stdtrit(blocks - 1, _LEVEL)) * error
 
 
 _MOST_STATES = 4000

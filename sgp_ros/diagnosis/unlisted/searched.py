@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from sgp_ros.batch.least_squares import correlation_factor
 from sgp_ros.diagnosis.explain.fitted_model import Model
@@ -48,4 +48,4 @@ class Searched:
         rows = len(gain) / correlation_factor(gain)
         spread = max(float(gain.std()), 1e-300) / math.sqrt(rows)
         ratio = (law.mean() + self.floor) / ((self.free**2).mean() + self.floor)
-        return float(ratio), float(stats.norm.sf(gain.mean() / spread))
+        return float(ratio), float(special.ndtr(-gain.mean() / spread))
