@@ -86,7 +86,13 @@ def test_shipped_files_are_found_from_the_source_tree():
     assert find_shipped('nothing.yaml') is None
 
 
-@pytest.fixture(scope='module', params=[(), ('--symlink-install',)], ids=['copied', 'linked'])
+@pytest.fixture(
+    scope='module',
+    params=[
+        pytest.param((), id='copied'),
+        pytest.param(('--symlink-install',), id='linked', marks=pytest.mark.long),
+    ],
+)
 def workspace(request, tmp_path_factory):
     """A colcon workspace that holds a copy of the sources, built."""
     folder = tmp_path_factory.mktemp('workspace')

@@ -26,6 +26,7 @@ def diagnosed(real):
     return sgp.diagnose(real, robot='simple_pendulum')
 
 
+@pytest.mark.long
 def test_a_diagnosis_is_an_object_with_findings_and_figures(diagnosed, capsys):
     """Nothing is printed; it shows itself in a notebook with verdict, robot and numbers."""
     assert capsys.readouterr().out == ''
@@ -41,6 +42,7 @@ def test_a_diagnosis_is_an_object_with_findings_and_figures(diagnosed, capsys):
         diagnosed.plot('hologram')
 
 
+@pytest.mark.long
 def test_it_writes_the_files_of_the_command(diagnosed, tmp_path):
     """The page, the content of diagnosis.json, and a robot that can be loaded."""
     assert diagnosed.save(tmp_path).is_file()

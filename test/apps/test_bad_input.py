@@ -67,6 +67,7 @@ def test_a_simulation_without_overlap_is_refused(tmp_path, robot, capsys):
         )
 
 
+@pytest.mark.long
 def test_files_of_different_machines_are_refused(tmp_path, robot, capsys):
     """A recording, a held-out recording, a simulation: by names, then by kinds of joints."""
     ours, theirs = _recording(tmp_path, 'ours'), _recording(tmp_path, 'theirs', name='knee')

@@ -75,6 +75,7 @@ def test_the_machine_follows_its_recording_and_the_model_does_not(folder, tmp_pa
     assert states[near] == pytest.approx(float(row['hinge_open_whole_simulated']), abs=1e-6)
 
 
+@pytest.mark.long
 def test_targets_are_followed_in_closed_loop(folder, tmp_path):
     """With gains the drives act on the simulated motion; only then is the whole stable."""
     kp, kd, rate = 40.0, 3.0, 100

@@ -122,6 +122,7 @@ def test_predictions_have_a_column_for_each_joint_and_come_often_enough(finished
         assert numbers[0, 0] >= 0.0
 
 
+@pytest.mark.long
 def test_a_replay_of_the_diagnosed_robot_delivers_what_was_promised(finished):
     """Within a factor of two, joint by joint, in windows that the stream chose."""
     number, out, _ = finished

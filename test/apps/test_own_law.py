@@ -42,6 +42,7 @@ def written(tmp_path_factory):
     return folder
 
 
+@pytest.mark.long
 def test_it_is_found_with_its_numbers(written):
     """As the effect `law`, with formula and units, in file and report."""
     found = json.loads((written / 'out' / 'diagnosis.json').read_text())
@@ -58,6 +59,7 @@ def test_it_is_found_with_its_numbers(written):
     assert (written / 'out' / 'law.png').exists()
 
 
+@pytest.mark.long
 def test_it_is_written_as_known_and_used_again(written, tmp_path):
     """In a robot of which the law is a part: a column of its model, and a simulation."""
     path = written / 'out' / 'robot_diagnosed.yaml'

@@ -77,6 +77,7 @@ def test_the_motions_of_both_models_lie_over_the_measured_one(machine, tmp_path)
         assert np.nanstd(error) < 0.1 * series['train/position'].std()
 
 
+@pytest.mark.long
 def test_another_machine_is_refused(machine, tmp_path, capsys):
     """One line names the joints of both."""
     (tmp_path / 'sim.xml').write_text(MJCF.format(armature=0).replace('hinge', 'knee'))

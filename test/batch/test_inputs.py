@@ -73,6 +73,7 @@ def test_friction_that_depends_on_the_place_is_seen_so():
     assert choose_inputs(data, SLIDER).names == (('own:position', 'own:direction'),)
 
 
+@pytest.mark.long
 def test_complete_physics_keeps_no_process_even_under_coloured_noise():
     """Six worlds: a level of 5 % lets one pass now and then, evidence would take most of them."""
     worlds = [_data(seed, lambda q, _v: 0.0 * q, 160, 0.9) for seed in range(6)]

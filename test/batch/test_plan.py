@@ -33,7 +33,9 @@ def _error(signals, filter_plan):
     return np.linalg.norm((w / AXIS_TRUTH - 1.0)[:3])
 
 
-@pytest.mark.parametrize('world', WORLDS)
+@pytest.mark.parametrize(
+    'world', ['both', *(pytest.param(x, marks=pytest.mark.long) for x in WORLDS if x != 'both')]
+)
 def test_the_chosen_cutoff_is_nearly_as_good_as_the_best_one(world):
     """Over eight recordings the error of the coefficients is within half of the best fixed one.
 

@@ -40,6 +40,7 @@ def test_the_equation_of_motion_survives_the_filter(signals):
     assert w == pytest.approx(AXIS_TRUTH, rel=0.02)
 
 
+@pytest.mark.long
 def test_a_change_of_direction_is_smeared_in_column_and_force_alike(signals):
     """Columns of filtered states instead of filtered columns leave several times the error."""
     data = filtered_data(signals, LINEAR_AXIS, PLAN)

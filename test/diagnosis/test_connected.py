@@ -143,7 +143,11 @@ def test_what_is_found_with_an_error_of_the_connection_too_is_as_certain():
 
 @pytest.mark.parametrize(
     ('offset', 'undone', 'is_alike'),
-    [(0.0, {}, True), (0.0, {'effort_scale': -1.0}, False), (0.4, {'offset': 0.4}, False)],
+    [
+        (0.0, {}, True),
+        pytest.param(0.0, {'effort_scale': -1.0}, False, marks=pytest.mark.long),
+        pytest.param(0.4, {'offset': 0.4}, False, marks=pytest.mark.long),
+    ],
 )
 def test_a_correction_shows_with_the_laws_that_were_found(robots, offset, undone, is_alike):
     """Bodies that stood for an offset go with it; a sign that is right has no other."""

@@ -46,7 +46,7 @@ def counted(monkeypatch):
     return counts
 
 
-@pytest.mark.parametrize('period_s', [0.005, FINE])
+@pytest.mark.parametrize('period_s', [pytest.param(0.005, marks=pytest.mark.long), FINE])
 def test_a_diagnosis_does_no_more_work_than_it_did(robots, counted, monkeypatch, period_s):
     """Dry friction: screening, fits, roll-outs, and the search for errors of the connection.
 

@@ -58,7 +58,7 @@ def diagnosed(robots):
 
 @pytest.mark.parametrize(
     'name',
-    [x if x in {'coulomb_friction', 'command_delay'} else pytest.param(x, marks=pytest.mark.long)
+    [x if x == 'coulomb_friction' else pytest.param(x, marks=pytest.mark.long)
      for x in PLANTED],
 )  # fmt: skip
 def test_planted_physics_is_named_with_its_numbers(diagnosed, name):
@@ -85,7 +85,10 @@ def test_a_delay_comes_with_how_long_commands_are_held(diagnosed):
     assert not any('taken to hold' in r for r in diagnosed('cogging').remarks)
 
 
-@pytest.mark.parametrize('name', PLANTED)
+@pytest.mark.parametrize(
+    'name',
+    [pytest.param(x, marks=pytest.mark.long) if x != 'coulomb_friction' else x for x in PLANTED],
+)
 def test_what_is_said_of_a_diagnosis_is_consistent(diagnosed, name):
     """Probabilities are such, the asserted is more probable than what lost, shares are shares."""
     found = diagnosed(name)
@@ -109,7 +112,10 @@ def test_what_is_said_of_a_diagnosis_is_consistent(diagnosed, name):
     assert np.all((traces.after**2).mean(axis=0) <= (traces.before**2).mean(axis=0))
 
 
-@pytest.mark.parametrize('name', PLANTED)
+@pytest.mark.parametrize(
+    'name',
+    [pytest.param(x, marks=pytest.mark.long) if x != 'coulomb_friction' else x for x in PLANTED],
+)
 def test_what_is_named_predicts_a_recording_that_was_held_out(robots, diagnosed, name):
     """The error of the effort falls to a hundredth; accelerations are finite at every state."""
     found = diagnosed(name)

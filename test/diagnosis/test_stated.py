@@ -144,8 +144,8 @@ def test_roll_outs_of_the_nominal_robot_have_what_it_states(named, robots):
 @pytest.mark.parametrize(
     'name',
     [
-        'coulomb_friction',
-        *(pytest.param(x, marks=pytest.mark.long) for x in ('viscous_friction', 'spring')),
+        pytest.param(x, marks=pytest.mark.long)
+        for x in ('coulomb_friction', 'viscous_friction', 'spring')
     ],
 )
 def test_what_the_robot_states_too_much_of_is_taken_off(robots, name):

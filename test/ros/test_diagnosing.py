@@ -75,6 +75,7 @@ def test_what_is_remembered_comes_back() -> None:
     assert (third.stamp_ns, third.names) == (6, None)
 
 
+@pytest.mark.long
 def test_the_garbage_collector_does_not_search_what_is_remembered() -> None:
     """A minute at a kilohertz is so much that a search holds up messages for 50 ms."""
     kept = _diagnosing(3600.0)

@@ -54,6 +54,7 @@ def test_open_bodies_are_found_beside_friction(robots):
     np.testing.assert_allclose(filled.parameters[1, [3, 6]], tree.parameters[1, [3, 6]], rtol=0.03)
 
 
+@pytest.mark.long
 def test_a_robot_without_inertia_is_diagnosed_and_its_links_are_named(robots):
     """Friction is still told from inertia, and no body is called wrong that was never stated."""
     robot, tree = robots[1]

@@ -100,6 +100,7 @@ def test_a_law_that_few_joints_have_does_not_stand(rubbed, monkeypatch):
     assert excess[0] == 3.0
 
 
+@pytest.mark.long
 def test_a_joint_where_no_law_stands_stays_open_beside_one_where_a_law_does(equations_for):
     """However much it leaves, for that is within the accuracy of the forces."""
 

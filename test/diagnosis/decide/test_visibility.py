@@ -68,6 +68,7 @@ def test_twice_the_stated_size_is_found_and_half_of_it_is_not(stated, equations_
         assert found.keys() <= {effect.name}
 
 
+@pytest.mark.long
 def test_what_was_found_is_stated_too(viscous, equations_for, stated):
     """The friction that is there does not hide what would have been seen of it."""
     _, equations = equations_for(viscous)

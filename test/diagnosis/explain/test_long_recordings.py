@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import pytest
+
 from sgp_ros.diagnosis.compare import sample
 from sgp_ros.diagnosis.explain.comparison import MOST_PAIRS, MOST_SINGLES, PARENTS, compare_models
 
 
+@pytest.mark.long
 def test_few_rows_rank_what_all_rows_are_fitted_to(equations_for, viscous, monkeypatch):
     equations = equations_for(viscous)[1]
     whole = compare_models(equations, lambda _share: None)

@@ -35,6 +35,7 @@ def probe_of(world, robot, tree):
     return Probe(raw, tree, choose_bandwidth(raw, tree))
 
 
+@pytest.mark.long
 def test_efforts_in_another_unit_are_found_beside_friction(slow):
     """And not a scale of the positions that makes all accelerations large."""
     world, robot, tree = slow

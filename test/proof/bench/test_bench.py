@@ -22,6 +22,7 @@ CONTRACT = {
 }  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_row_of_the_step_has_what_is_promised():
     """Keys of the contract; what is not installed is null, and the tables say so."""
     row = step_row(20, 2, 3, NOBODY, 1)
@@ -33,6 +34,7 @@ def test_a_row_of_the_step_has_what_is_promised():
     assert 'not installed' in bench_tables({'machine': {}, 'step': [row]})
 
 
+@pytest.mark.long
 def test_a_step_leaves_nothing_allocated():
     """In the steady state memory does not grow; a work that keeps something is noticed."""
     assert step_row(20, 2, 3, NOBODY, 1)['allocations'] == 0

@@ -9,6 +9,7 @@ import pytest
 from sgp_ros.recordings.reader import open_recording
 
 
+@pytest.mark.long
 def test_a_world_is_drawn_with_its_gains_and_answer(tmp_path):
     pytest.importorskip('mujoco')
     from sgp_proof.connection.servoed import draw_case
