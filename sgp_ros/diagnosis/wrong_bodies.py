@@ -29,7 +29,12 @@ def parameter_errors(
     """
     if not model.is_free:
         return ()
-    numbers, _ = _numbers(equations, model, unstated, other)
+    if other is None:
+        change, stated = _changed(model), equations.motion.tree.parameters
+    else:
+        change = model.w, _of_bodies(model) + _of_bodies(other)
+        stated = equations.with_bodies(equations.motion, other.w).tree.parameters
+    numbers, _ = _numbers(equations, *change, stated, unstated)
     return tuple(filter(_differs, numbers))
 
 
@@ -45,28 +50,34 @@ def traded_remarks(
     """
     if not model.is_free:
         return
-    numbers, C = _numbers(equations, model, unstated)
+    told = {(e.link, e.parameter) for e in parameter_errors(equations, model, unstated)}
+    stated = equations.motion.tree.parameters
+    numbers, C = _numbers(equations, model.w, _of_bodies(model), stated, unstated)
     unit = np.sqrt(np.maximum(np.diag(C), 1e-300))
     x, C = np.array([e.value - e.nominal for e in numbers]) / unit, C / np.outer(unit, unit)
-    held = [i for i, e in enumerate(numbers) if not _differs(e) and unit[i] > 1e-150]
+    held = [i for i, e in enumerate(numbers) if (e.link, e.parameter) not in told]
     while held:
         costs = {i: _cost(x, C, [u for u in held if u != i]) for i in held}
         least = min(costs.values())
         if _cost(x, C, held) < least + EVIDENCE:
             return
-        alike = [i for i in held if costs[i] < least + PER_PARAMETER]
-        told = []
-        for i in alike:
-            others = [u for u in held if u != i]
-            solved = np.linalg.lstsq(C[np.ix_(others, others)], C[others, i], rcond=None)[0]
-            now = numbers[i].nominal + float((x[i] - solved @ x[others]) * unit[i])
-            e = numbers[i]
-            told.append(f'{e.parameter} of {e.link} {now:.3g} instead of {e.nominal:.3g} {e.unit}')
+        likely = [i for i in held if costs[i] < least + PER_PARAMETER]
+        said = (_alone(numbers[i], unit[i], x, C, i, [u for u in held if u != i]) for i in likely)
         yield (
-            f'Bodies differ in one more number, which this motion cannot place. If all others '
-            f'are as stated, it is {" or ".join(told)}.'
+            'Bodies differ in one more number, which this motion cannot place. If all others '
+            f'are as stated, it is {" or ".join(said)}.'
         )
         held.remove(min(costs, key=lambda i: costs[i]))
+
+
+def _alone(
+    e: ParameterError, unit: float, x: np.ndarray, C: np.ndarray, i: int, held: list[int]
+) -> str:
+    """Return what a number is if those that are held are as stated."""
+    solved = np.linalg.lstsq(C[np.ix_(held, held)], C[held, i], rcond=None)[0]
+    now = e.nominal + float(x[i] - solved @ x[held]) * unit
+    name = 'mass' if e.parameter == 'mass' else f'{e.parameter[-1]} of the centre of mass'
+    return f'{name} of {e.link} {now:.3g} instead of {e.nominal:.3g} {e.unit}'
 
 
 def _cost(x: np.ndarray, C: np.ndarray, held: list[int]) -> float:
@@ -80,18 +91,19 @@ def _differs(e: ParameterError) -> bool:
 
 
 def _numbers(
-    equations: Equations, model: Model, unstated: Collection[int], other: Model | None = None
-) -> tuple[list[ParameterError], np.ndarray]:
+    equations: Equations, w: np.ndarray, C: np.ndarray, stated: np.ndarray,
+    unstated: Collection[int],
+) -> tuple[list[ParameterError], np.ndarray]:  # fmt: skip
     """Return masses and centres of all bodies, (n,), and the covariance of what they are, (n, n).
 
-    Arguments are those of `parameter_errors`.
+    Args:
+        equations: of the recording.
+        w: change of the bodies (p,).
+        C: its covariance (p, p).
+        stated: parameters that are right if nothing differs (b, 10).
+        unstated: bodies that are left out.
     """
     tree = equations.motion.tree
-    if other is None:
-        (w, C), stated = _changed(model), tree.parameters
-    else:
-        w, C = model.w, _of_bodies(model) + _of_bodies(other)
-        stated = equations.with_bodies(equations.motion, other.w).tree.parameters
     changed = equations.with_bodies(equations.motion, w).tree.parameters
     D = equations.directions.reshape(len(C), -1, 10)
     numbers, S = [], []

@@ -47,7 +47,9 @@ def test_numbers_that_trade_are_told_as_such(equations_for):
     _, equations = equations_for(simulate(chain, 5))
     names = equations.motion.tree.link_names
     (said,) = traded_remarks(equations, fitted(equations, is_free=True))
-    centre = re.search(f'com_z of {names[1]} -([0-9.]+) instead of -0.15 m', said)
+    centre = re.search(
+        f'z of the centre of mass of {names[1]} -([0-9.]+) instead of -0.15 m', said
+    )
     assert float(centre.group(1)) == pytest.approx(chain[1].centre, rel=0.02)
     assert f'mass of {names[1]}' in said
 
