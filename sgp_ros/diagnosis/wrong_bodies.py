@@ -8,9 +8,19 @@ from dataclasses import replace
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import ALIKE, EVIDENCE, NUMBER_ERROR, PER_PARAMETER
+from sgp_ros.diagnosis.criteria import (
+    ALIKE,
+    EVIDENCE,
+    NUMBER_ERROR,
+    PER_PARAMETER,
+    STRUCTURE_LEAST_SHARE,
+)
+from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.result import ParameterError
+from sgp_ros.physics.catalogue import CONSTANT_LOAD
+from sgp_ros.physics.effect_at import EffectAt
 
 
 def parameter_errors(
@@ -19,7 +29,8 @@ def parameter_errors(
 ) -> tuple[ParameterError, ...]:  # fmt: skip
     """Return masses and centres that differ by more than two standard deviations.
 
-    Those of one body, with all others as stated, where one alone explains what all of them do.
+    Those of one body, with all others as stated, where one alone explains what all of them do. How
+    far an offset of the efforts would move them is an error of theirs.
 
     Args:
         equations: of the recording.
@@ -29,13 +40,30 @@ def parameter_errors(
     """
     if not model.is_free:
         return ()
-    if other is None:
-        change, stated = _changed(model), equations.motion.tree.parameters
-    else:
+    if other is not None:
         change = model.w, _of_bodies(model) + _of_bodies(other)
         stated = equations.with_bodies(equations.motion, other.w).tree.parameters
-    numbers, _ = _numbers(equations, *change, stated, unstated)
-    return tuple(filter(_differs, numbers))
+        return tuple(filter(_differs, _numbers(equations, *change, stated, unstated)[0]))
+    stated = equations.motion.tree.parameters
+    alone, beside = (_numbers(equations, *_changed(m), stated, unstated)[0]
+                     for m in (model, _with_offsets(equations, model)))  # fmt: skip
+    return tuple(filter(_differs, map(_widened, alone, beside)))
+
+
+def _with_offsets(equations: Equations, model: Model) -> Model:
+    """Return a model with a constant force at each motor, as sensors of effort have it."""
+    motion = equations.motion
+    loads = (EffectAt(CONSTANT_LOAD, place) for place in CONSTANT_LOAD.places(motion)
+             if motion.moves[place.joint] and motion.tree.is_actuated[place.joint])  # fmt: skip
+    more = (s for s in loads if s.key not in model.key)
+    return fit(Columns(equations), (*model.effects, *more), model.sigma, is_free=True, w=model.w)
+
+
+def _widened(e: ParameterError, beside: ParameterError) -> ParameterError:
+    """Return a number with what offsets move it beyond chance as an error, see `widened`."""
+    by_chance = max(beside.std**2 - e.std**2, 0.0)
+    moved = max((beside.value - e.value) ** 2 - by_chance, 0.0)
+    return replace(e, std=float(np.sqrt(e.std**2 + moved)))
 
 
 def traded_remarks(
@@ -46,20 +74,22 @@ def traded_remarks(
     Numbers of several bodies may do the same, so that none is known by itself. Of changes
     `x ~ N(x_hat, C)`, a set u costs `x_u' C_uu^-1 x_u / 2` nats if it stays as stated, and the
     others are then `x_hat - C_u C_uu^-1 x_u` [source: conditional normal distribution]. What a
-    number saves must be worth `EVIDENCE`.
+    number saves must be worth `EVIDENCE`, and no small part of what all of them cost.
     """
     if not model.is_free:
         return
     told = {(e.link, e.parameter) for e in parameter_errors(equations, model, unstated)}
     stated = equations.motion.tree.parameters
+    model = _with_offsets(equations, model)
     numbers, C = _numbers(equations, model.w, _of_bodies(model), stated, unstated)
     unit = np.sqrt(np.maximum(np.diag(C), 1e-300))
     x, C = np.array([e.value - e.nominal for e in numbers]) / unit, C / np.outer(unit, unit)
     held = [i for i, e in enumerate(numbers) if (e.link, e.parameter) not in told]
+    asked = max(EVIDENCE, STRUCTURE_LEAST_SHARE * _cost(x, C, [*range(len(x))]))
     while held:
         costs = {i: _cost(x, C, [u for u in held if u != i]) for i in held}
         least = min(costs.values())
-        if _cost(x, C, held) < least + EVIDENCE:
+        if _cost(x, C, held) < least + asked:
             return
         likely = [i for i in held if costs[i] < least + PER_PARAMETER]
         said = (_alone(numbers[i], unit[i], x, C, i, [u for u in held if u != i]) for i in likely)
