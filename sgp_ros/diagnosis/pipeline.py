@@ -147,7 +147,6 @@ def _diagnosed(
     equations, model, comparison = several.equations, several.model, several.comparison
     decision, depends = several.decision, dependences(equations, comparison.base.residual)
     lags = [lag for lag in sensor_lags(raw, equations) if lag.is_physics]
-    on_z += _harm(final, {k: x for k, x in parts.items() if k != 'train'}, proofs)
     doubts, on_all = reasons_to_doubt(proofs, recordings.still), replace(decision, model=model)
     wrong = parameter_errors(whole, model, recordings.unstated)
     findings, forces = asserted(whole, on_all, lags, learned, chances, depends)
@@ -206,6 +205,7 @@ def _proven(connected: Connected, parts: Mapping[str, RawTrajectory]) -> _Proven
         others = {stem: proof for stem, proof in proofs.items() if stem != HELD_OUT}
         fewer = without_laws_of(several, not_carried_over(others, connected.recordings.still))
         if fewer is several:
+            on_z += _harm(final, {k: x for k, x in parts.items() if k != 'train'}, proofs)
             return several, sides, chances, final, learned, on_z, proofs
         several = fewer
 

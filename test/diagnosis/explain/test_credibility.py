@@ -115,7 +115,7 @@ def test_a_ripple_is_not_seen_where_a_joint_turns_back_in_the_same_places(
 def test_two_laws_that_hold_the_same_plain_one_have_no_numbers(
     equations_for, perfect, other, credible
 ):
-    """What differs with direction beside friction that falls is a constant load there."""
+    """Friction that differs with direction beside one that falls is a constant load there."""
     _, equations = equations_for(perfect[1])
     both = [EffectAt(EFFECTS['stribeck_friction'], Place(0), np.array([0.1])),
             EffectAt(EFFECTS[other], Place(0))]  # fmt: skip
