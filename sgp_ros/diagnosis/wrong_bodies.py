@@ -136,7 +136,7 @@ def _numbers(
     tree = equations.motion.tree
     changed = equations.with_bodies(equations.motion, w).tree.parameters
     D = equations.directions.reshape(len(C), -1, 10)
-    numbers, S = [], []
+    numbers, functionals = [], []
     for body, link in enumerate(tree.link_names):
         before, after = stated[body], changed[body]
         if after[0] <= 0.0 or before[0] <= 0.0 or body in unstated:
@@ -154,8 +154,8 @@ def _numbers(
             std = float(np.sqrt(max(float(slopes[name] @ C @ slopes[name]), 0.0)))
             std = float(np.hypot(std, NUMBER_ERROR * abs(now - then)))
             numbers.append(ParameterError(link, name, float(now), std, float(then), unit))
-            S.append(slopes[name])
-    S = np.reshape(S, (-1, len(C)))
+            functionals.append(slopes[name])
+    S = np.reshape(functionals, (-1, len(C)))
     return numbers, np.asarray(S @ C @ S.T)
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import (
     ALIKE,
+    BENT_BODIES,
     LACKING,
     LAW_REST,
     LEAST_LAW,
@@ -31,7 +32,7 @@ from sgp_ros.diagnosis.decide.equivalence import Contrasts, moved
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
-from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.fitted_model import Model, adds_to_usual
 from sgp_ros.diagnosis.explain.joint_search import usual
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.unlisted.beside import PLAIN, acts_as_bodies, law_of, own_effects, says_less
@@ -76,8 +77,9 @@ def with_laws(equations: Equations, comparison: Comparison, decision: Decision) 
     scale, joints = Scale.of(equations, comparison), _joints(equations, comparison, decision)
     named = [j for j in joints if j not in decision.unknown]
     coloured = _coloured(equations, scale, decision.model, named)
-    open_ = {*decision.unknown, *coloured, *_remembering(decision.model)}
-    apart, waiting = _apart(columns, decision), list[Searched]()
+    bent = _bent(decision.model)
+    open_ = {*decision.unknown, *coloured, *_remembering(decision.model), *bent}
+    apart, waiting = _apart(columns, decision, bent), list[Searched]()
     for joint in joints:
         listed = found.decision.tentative or found.decision.model
         listed = waiting[-1].laws[0] if waiting else apart or listed
@@ -85,7 +87,7 @@ def with_laws(equations: Equations, comparison: Comparison, decision: Decision) 
         if not is_open and not promises(columns, listed, joint):
             continue
         searched = search(columns, scale, listed, joint, is_open=is_open)
-        if searched is None:
+        if searched is None or (joint in bent and not _is_better(scale, searched, decision)):
             continue
         more = replace(found, searched=(*found.searched, searched))
         more = _decided(equations, more, searched, waiting)
@@ -99,16 +101,32 @@ def with_laws(equations: Equations, comparison: Comparison, decision: Decision) 
     return found
 
 
-def _apart(columns: Columns, decision: Decision) -> Model | None:
+def _is_better(scale: Scale, searched: Searched, decision: Decision) -> bool:
+    """Return whether a formula or a smooth force is worth more than all that is asserted."""
+    *others, asserted = map(scale.of_forms().worth, (
+        searched.smooth, *searched.laws[:1], decision.tentative or decision.model))  # fmt: skip
+    return max(others) > asserted + ALIKE
+
+
+def _bent(model: Model) -> set[int]:
+    """Return the joints of rare laws beside unlikely bodies: both may imitate another law."""
+    if not model.is_free or model.strain < BENT_BODIES:
+        return set()
+    rare = (s.place for s in model.effects if not adds_to_usual(s.effect))
+    return {j for place in rare for j in (place.joint, place.source) if j >= 0}
+
+
+def _apart(columns: Columns, decision: Decision, bent: set[int]) -> Model | None:
     """Return the best model with everyday laws in place of those of two unknown joints.
 
-    None where it has none. Such a law may have imitated what is unknown at either of them.
+    And of rare laws beside bent bodies. None where it has none. They may imitate another law.
     """
     model = decision.tentative or decision.model
     kept = tuple(
         s
         for s in model.effects
-        if s.place.source < 0 or not {s.place.joint, s.place.source} <= {*decision.unknown}
+        if (s.place.source < 0 or not {s.place.joint, s.place.source} <= {*decision.unknown})
+        and (adds_to_usual(s.effect) or s.place.joint not in bent)
     )
     return None if kept == model.effects else usual(columns, model, kept, least=0.0)
 

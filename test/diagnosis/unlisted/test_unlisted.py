@@ -561,9 +561,9 @@ def test_what_is_unknown_at_two_joints_is_looked_for_beside_everyday_laws(equati
     both = EffectAt(law, place, law.starts(equations.motion, place)[0])
     model = fit(columns, (both,), fitted(equations).sigma, is_free=False)
     decision = Decision('unexplained', model, (), np.ones(2), 0, (0, 1))
-    apart = assertion._apart(columns, decision)
+    apart = assertion._apart(columns, decision, set())
     assert {s.name for s in apart.effects} <= {'viscous_friction', 'coulomb_friction', 'armature'}
-    assert assertion._apart(columns, replace(decision, unknown=(0,))) is None
+    assert assertion._apart(columns, replace(decision, unknown=(0,)), set()) is None
 
 
 @pytest.mark.parametrize(('share', 'joints'), [(0.9, [1]), (0.1, [])])
@@ -598,3 +598,52 @@ def test_a_law_may_stand_for_a_listed_one_that_remembers(monkeypatch, equations_
             equations, comparison, replace(decision, model=model, unknown=(), tentative=None)
         )
     assert asked == [True, False]
+
+
+@pytest.mark.parametrize(
+    ('strain', 'is_free', 'joints'), [(2.0, True, {1, 2}), (0.5, True, set()), (2.0, False, set())]
+)
+def test_rare_laws_beside_bent_bodies_may_imitate_another(strain, is_free, joints):
+    """A spring and a coupling, but no friction of any kind."""
+    places = {
+        'spring': Place(1), 'joint_coupling': Place(2, source=1), 'coulomb_friction': Place(3),
+        'stribeck_friction': Place(0),
+    }  # fmt: skip
+    effects = tuple(EffectAt(EFFECTS[name], place) for name, place in places.items())
+    model = SimpleNamespace(is_free=is_free, strain=strain, effects=effects)
+    assert assertion._bent(model) == joints
+
+
+def test_what_bent_bodies_and_rare_laws_say_is_asked_again(monkeypatch, equations_for):
+    """Beside everyday laws; what is found there counts only if it is worth more than they are."""
+    _, equations = equations_for(simulate(CHAINS[1], 12, 6.0, force=_brake))
+    comparison = compare_models(equations, lambda _share: None)
+    decision = decide(equations, comparison)
+    asked = []
+
+    def search(_columns, _scale, listed, joint, *, is_open):
+        asked.append(({s.name for s in listed.effects} & {'spring'}, is_open))
+        return SimpleNamespace(smooth=None, laws=(), joint=joint, is_slight=False)
+
+    monkeypatch.setattr(assertion, 'search', search)
+    monkeypatch.setattr(assertion, 'promises', lambda *_: False)
+    monkeypatch.setattr(assertion, '_coloured', lambda *_: [])
+    monkeypatch.setattr(assertion, '_is_better', lambda *_: False)
+    model = fitted(equations, 'spring', is_free=True)
+    decision = replace(decision, model=model, unknown=(), tentative=None)
+    for is_bent_, expected in ((False, []), (True, [(set(), True)])):
+        monkeypatch.setattr(assertion, '_bent', lambda _m, found=is_bent_: {0} if found else set())
+        found = with_laws(equations, comparison, decision)
+        assert found.searched == ()
+        assert asked == expected
+
+
+@pytest.mark.parametrize(('worth', 'is_better'), [(ALIKE + 1.0, True), (ALIKE - 1.0, False)])
+def test_a_form_is_better_than_all_that_is_asserted(worth, is_better):
+    """By more than a recording prefers between models that are alike."""
+    smooth, law, asserted = object(), object(), object()
+    worths = {smooth: 0.5 * worth, law: worth, asserted: 0.0}
+    scale = SimpleNamespace(of_forms=lambda: SimpleNamespace(worth=worths.__getitem__))
+    searched = SimpleNamespace(smooth=smooth, laws=(law, smooth))
+    decision = SimpleNamespace(model=asserted, tentative=None)
+    assert assertion._is_better(scale, searched, decision) is is_better
