@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from sgp_proof.concealed.concealed_effect import OUTSIDE, Concealed
+from sgp_proof.concealed.eighth_families import OF_EFFORT
 from sgp_proof.concealed.unknown import NAME, UNKNOWN
 from sgp_proof.concealed.unlisted import constants, family_of
 from sgp_ros.physics.catalogue import EFFECTS
-from sgp_ros.physics.drawing import Scene
+from sgp_ros.physics.drawing import Scene, UnsuitableError
 from sgp_ros.physics.parts import MOTOR
 
 
@@ -58,6 +59,11 @@ def _unknown(scene, family=''):
     }  # fmt: skip
     width = motion.high - motion.low
     fixed |= constants(kind, rng, float(0.5 * width[fixed['source']]))
+    if kind in OF_EFFORT:
+        source = bodies[fixed['source']]
+        if source.is_prismatic or not source.is_driven:
+            raise UnsuitableError(f'the effort of {source.joint} hardly varies')
+        fixed['source_effort'] = float(motion.effort[fixed['source']])
     place = {}
     if kind == 'burst':
         place = {

@@ -24,6 +24,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from sgp_proof.concealed import eighth_families as eighth
 from sgp_proof.concealed import fifth_families as fifth
 from sgp_proof.concealed import fourth_families as fourth
 from sgp_proof.concealed import second_families as second
@@ -39,9 +40,9 @@ from sgp_ros.physics.formula import read_formula
 HASHES = RESULTS / 'unlisted_hashes.json'
 SAME = 0.02
 """Greatest error of a law that is the true one, relative, over the states of the joint."""
-STATES = 2000
-STEP_S = 0.005
-"""Steps of a motion along which laws that remember are compared [s]."""
+STATES, STEP_S = 2000, 0.005
+EFFORT = np.random.default_rng(1).normal(size=STATES)
+"""Steps of a motion along which laws that remember are compared [s]; efforts over the usual."""
 FAILED = {'verdict': 'failed', 'findings': [], 'fit': {}}
 """Of a diagnosis that ended without an answer: a miss."""
 _REMEMBERS = re.compile(r'\b(lag|play|delay)\(').search
@@ -86,12 +87,12 @@ FAMILIES = {
     'walk': _walk,
 }
 """Name to force over its size. The last is no function of the motion: nothing is to be found."""
-SECOND_FROM, THIRD_FROM, FOURTH_FROM, FIFTH_FROM, SIXTH_FROM, SEVENTH_FROM = (
-    20_000, 40_000, 60_000, 70_000, 80_000, 90_000,
+SECOND_FROM, THIRD_FROM, FOURTH_FROM, FIFTH_FROM, SIXTH_FROM, SEVENTH_FROM, EIGHTH_FROM = (
+    20_000, 40_000, 60_000, 70_000, 80_000, 90_000, 100_000,
 )  # fmt: skip
 """Seeds from here on conceal a law of the second set, of the third, and so on."""
-_LATER = seventh, sixth, fifth, fourth, third
-_LATER_FROM = SEVENTH_FROM, SIXTH_FROM, FIFTH_FROM, FOURTH_FROM, THIRD_FROM
+_LATER = eighth, seventh, sixth, fifth, fourth, third
+_LATER_FROM = EIGHTH_FROM, SEVENTH_FROM, SIXTH_FROM, FIFTH_FROM, FOURTH_FROM, THIRD_FROM
 _SETS = (
     *((begin, x.FAMILIES, '') for begin, x in zip(_LATER_FROM, _LATER, strict=True)),
     (SECOND_FROM, second.FAMILIES, 'air_spring'),
@@ -100,6 +101,7 @@ _SETS = (
 """First seed, laws, and the law of robots of one joint in place of one of another joint."""
 _LAWS = dict(ChainMap(FAMILIES, *(x.FAMILIES for x in (second, *_LATER))))
 _REMEMBER = dict(ChainMap(*(x.REMEMBER for x in (second, *_LATER))))
+_ALSO = dict.fromkeys(fifth.OF_CLOCK, 't') | dict.fromkeys(eighth.OF_EFFORT, 'tau')
 _LISTED_PARTS = dict(ChainMap(*(x.LISTED_PARTS for x in _LATER)))
 BUILDERS = {name: force(law) for name, law in _LAWS.items()}
 BUILDERS |= {name: x.SET.builder(name) for x in _LATER for name in x.FAMILIES}
@@ -133,13 +135,14 @@ def true_force(parameters, q, v):
     Of one that remembers they are a motion in steps of `STEP_S`.
     """
     kind, memory = parameters['kind'], np.zeros(len(q[0]))
+    effort = parameters.get('source_effort', 0.0) * EFFORT
     if kind in _REMEMBER:
         memory = second.memory_along(*_REMEMBER[kind], q[0], v[0], STEP_S, parameters)
     law = _LAWS[kind]
     return np.array([
         parameters['a'] * law(q[0][i], v[0][i], SimpleNamespace(
             position={parameters['source']: q[1][i]}, velocity={parameters['source']: v[1][i]},
-            time_s=STEP_S * i, state=(memory[i],),
+            time_s=STEP_S * i, state=(memory[i],), drive={parameters['source']: effort[i]},
         ), parameters)
         for i in range(len(q[0]))
     ])  # fmt: skip
@@ -172,18 +175,18 @@ def law_error(effect, finding, beside=()):
     p = effect['parameters']
     if p['kind'] in OF_TIME:
         return math.inf
-    remembers = p['kind'] in _REMEMBER
-    q, v = _motion(p) if remembers or _REMEMBERS(finding['formula']) else _states(p)
+    q, v = _motion(p) if p['kind'] in _REMEMBER or _REMEMBERS(finding['formula']) else _states(p)
     names = [effect['joint'], p['source'] if isinstance(p['source'], str) else '']
     true = true_force(p, q, v)
     numbers = {name: x['value'] for name, x in finding['parameters'].items()}
     formula = read_formula(finding['formula'].partition('=')[2], is_law=True)
-    refused = {'tau'} if p['kind'] in fifth.OF_CLOCK else {'tau', 't'}
-    if any((j not in names and k != 't') or k in refused for k, j in formula.signals):
+    refused, whose = {'tau', 't'} - {_ALSO.get(p['kind'])}, {'t': [''], 'tau': names[1:]}
+    if any(k in refused or j not in whose.get(k, names) for k, j in formula.signals):
         return math.inf
 
     def signal(kind, joint):
-        return lambda _at: {'q': q, 'dq': v}.get(kind, v)[names.index(joint)]
+        of = {'q': q, 'tau': (None, p.get('source_effort', 0.0) * EFFORT)}.get(kind, v)
+        return lambda _at: of[names.index(joint)]
 
     numbers['t'] = STEP_S * np.arange(len(q[0]))
     special = {'lag': _lag, 'play': _play, 'delay': _delay}.get
@@ -230,9 +233,7 @@ def score(answer, diagnosis):
     is_found = not listed and len(errors) == 1 and errors[0] <= SAME
     is_found = is_found and laws[0]['joint'] == effect['joint']
     far = diagnosis['fit'].get('real_far', {})
-    ratio = {
-        when: far.get(f'nmse_{when}', {}).get(effect['joint']) for when in ('before', 'after')
-    }  # fmt: skip
+    ratio = {x: far.get(f'nmse_{x}', {}).get(effect['joint']) for x in ('before', 'after')}
     return {
         'case': answer['case'], 'kind': effect['parameters']['kind'],
         'share': answer.get('effect_share_of_torque', {}).get(effect['joint']),

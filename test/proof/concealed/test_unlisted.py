@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sgp_proof.concealed import eighth_families as eighth
 from sgp_proof.concealed import fifth_families as fifth
 from sgp_proof.concealed import fourth_families as fourth
 from sgp_proof.concealed import second_families as second
@@ -17,8 +18,10 @@ from sgp_proof.concealed import seventh_families as seventh
 from sgp_proof.concealed import sixth_families as sixth
 from sgp_proof.concealed import sizes, unlisted
 from sgp_proof.concealed import third_families as third
+from sgp_proof.concealed.kinds import draw_unlisted
 from sgp_proof.concealed.unknown import OF_TIME, UNKNOWN
 from sgp_proof.concealed.unlisted import (
+    EIGHTH_FROM,
     FAMILIES,
     FIFTH_FROM,
     FOURTH_FROM,
@@ -34,7 +37,10 @@ from sgp_proof.concealed.unlisted import (
 )
 from sgp_ros.physics.drawing import UnsuitableError
 
-P = {'kind': 'magnetic_brake', 'a': 0.5, 'v': 1.5, 'reach': 1.0, 'source': -1.0, 'source_v': 1.0}
+P = {
+    'kind': 'magnetic_brake', 'a': 0.5, 'v': 1.5, 'reach': 1.0, 'source': -1.0, 'source_v': 1.0,
+    'source_effort': 1.0,
+}  # fmt: skip
 EFFECT = {'effect': 'unknown', 'joint': 'elbow', 'parameters': P}
 RIGHT = {
     'effect': 'law', 'joint': 'elbow', 'probability': 0.9,
@@ -86,7 +92,7 @@ def test_the_second_set_is_apart_from_all_others():
     assert set(second.KNOWN_SHAPES) <= set(second.FAMILIES)
 
 
-LATER_SETS = third, fourth, fifth, sixth, seventh
+LATER_SETS = third, fourth, fifth, sixth, seventh, eighth
 LATER = {kind: law for x in LATER_SETS for kind, law in x.FAMILIES.items()}
 REMEMBER = [kind for x in LATER_SETS for kind in x.REMEMBER]
 EARLIER = set(FAMILIES) | set(second.FAMILIES) | set(UNKNOWN)
@@ -104,6 +110,7 @@ def _drawn(kind):
         (fifth.FAMILIES, FIFTH_FROM, EARLIER | set(third.FAMILIES) | set(fourth.FAMILIES)),
         (sixth.FAMILIES, SIXTH_FROM, EARLIER | (set(LATER) - set(sixth.FAMILIES))),
         (seventh.FAMILIES, SEVENTH_FROM, EARLIER | (set(LATER) - set(seventh.FAMILIES))),
+        (eighth.FAMILIES, EIGHTH_FROM, EARLIER | (set(LATER) - set(eighth.FAMILIES))),
     ],
 )
 def test_a_later_set_is_apart_from_all_others(known, begin, earlier):
@@ -120,7 +127,13 @@ def test_a_later_set_is_apart_from_all_others(known, begin, earlier):
 
 @pytest.mark.parametrize(
     ('known', 'begin'),
-    [(fourth, FOURTH_FROM), (fifth, FIFTH_FROM), (sixth, SIXTH_FROM), (seventh, SEVENTH_FROM)],
+    [
+        (fourth, FOURTH_FROM),
+        (fifth, FIFTH_FROM),
+        (sixth, SIXTH_FROM),
+        (seventh, SEVENTH_FROM),
+        (eighth, EIGHTH_FROM),
+    ],
 )
 def test_a_later_set_has_its_seeds_in_order(known, begin):
     """Twenty families, from its first seed on."""
@@ -146,7 +159,7 @@ def test_constants_are_drawn_within_their_ranges(kind):
 
 @pytest.mark.parametrize('kind', LATER)
 def test_a_law_of_a_later_set_is_finite(kind):
-    """Twice as wide and fast as its motion too, and what is simulated is what is scored."""
+    """Twice as wide and fast as its motion too, the same each time, and simulated as scored."""
     p, rng = _drawn(kind), np.random.default_rng(2)
     states = rng.uniform(-2.0, 2.0, (2, 2, 200))
     if kind in REMEMBER:
@@ -154,6 +167,7 @@ def test_a_law_of_a_later_set_is_finite(kind):
         states = 2.0 * np.array([[np.sin(t)] * 2, [np.cos(t)] * 2])
     force = true_force(p, *states)
     assert np.isfinite(force).all()
+    assert (force == true_force(_drawn(kind), *states)).all()
     assert force.std() > 0.05
     if kind in REMEMBER:
         return
@@ -161,7 +175,9 @@ def test_a_law_of_a_later_set_is_finite(kind):
     (action,) = unlisted.BUILDERS[kind](0, p, ())
     for k, expected in enumerate(force):
         q, v = ({0: x[0, k], source: x[1, k]} for x in states)
-        moment = SimpleNamespace(position=q, velocity=v, time_s=k * unlisted.STEP_S)
+        moment = SimpleNamespace(
+            position=q, velocity=v, time_s=k * unlisted.STEP_S, drive={source: unlisted.EFFORT[k]}
+        )
         exerted = action.force(moment) if action.force else 0.0
         if action.dry_level:
             direction = int(np.sign(v[0]))
@@ -237,6 +253,10 @@ def test_listed_friction_in_a_law_may_be_named_beside_the_rest(is_apart):
             'damper_swung_by_other', '-dq[elbow]/3*cos(2*(swing*q[wrist]/0.7 + lean))',
             lambda _p: {'b': 1.0 / 3.0},
         ),
+        (
+            'thickening_fluid', '-0.25*dq[elbow]*(1 + tanh((abs(dq[elbow])/1.5 - jam)/over))',
+            lambda p: {'b': 0.5 * p['thin']},
+        ),
     ],
 )  # fmt: skip
 def test_a_listed_part_may_be_named_beside_the_rest(kind, rest, parameters):
@@ -305,6 +325,26 @@ def test_every_listed_part_of_a_law_can_be_scored():
             'oil_along_beam', 'a*lag(q[elbow], T)*cos(n*q[elbow] + x)',
             {'a': 1.5, 'T': 0.5, 'n': 2.0, 'x': 0.3},
         ),
+        (
+            'seat_belt_reel', '-a*dq[elbow]*max(abs(dq[elbow] - lag(dq[elbow], T)) - c, 0)',
+            {'a': 1.0 / 1.5**2, 'T': 0.3, 'c': 0.3 * 1.5},
+        ),
+        (
+            'folding_wiper', '-a*sin(n*(q[elbow] - play(q[elbow], w)))',
+            {'a': 0.5, 'n': 2.4 / 0.25, 'w': 0.5},
+        ),
+        (
+            'rocking_pad',
+            (
+                '-a*(q[elbow] - play(q[elbow], w))'
+                '*max(dq[elbow]*sign(q[elbow] - play(q[elbow], w)), 0)'
+            ),
+            {'a': 0.8 / 1.5 / 0.25, 'w': 0.5},
+        ),
+        (
+            'memory_wire', 'a*min(max((lag(dq[elbow]**2, T) - c)/d, 0), 1)',
+            {'a': 0.75, 'T': 0.3, 'c': 0.6 * 1.5**2, 'd': 0.7 * 1.5**2},
+        ),
     ],
 )  # fmt: skip
 def test_laws_that_remember_are_compared_along_a_motion(kind, formula, numbers):
@@ -312,7 +352,8 @@ def test_laws_that_remember_are_compared_along_a_motion(kind, formula, numbers):
     chosen = {'fill_s': 0.25, 'heat': 0.9, 'warm_s': 2.0, 'slack': 0.25, 'knee': 0.3,
               'stroke': 0.6, 'leak_s': 0.4, 'poles': 3.0, 'phase': 0.2,
               'follow_s': 0.5, 'oil_s': 0.6, 'swing': 2.0, 'lean': 0.3,
-              'coil_s': 0.3, 'run_s': 0.5}  # fmt: skip
+              'coil_s': 0.3, 'run_s': 0.5, 'trip': 0.3, 'ring_s': 0.3, 'fold': 2.4, 'warm': 0.6,
+              'over': 0.7, 'heat_s': 0.3}  # fmt: skip
     effect = {'joint': 'elbow', 'parameters': {**P, **chosen, 'kind': kind}}
     finding = {'formula': f'tau_x[elbow] = {formula}',
                'parameters': {name: {'value': x} for name, x in numbers.items()}}  # fmt: skip
@@ -335,6 +376,44 @@ def test_time_may_stand_in_the_formula_of_a_law_that_changes_with_it():
     assert law_error(effect, constant) > 0.1
     right_but_for_time = {**RIGHT, 'formula': f'{RIGHT["formula"]} + 0*t'}
     assert law_error(EFFECT, right_but_for_time) == math.inf
+
+
+def test_the_effort_of_the_source_may_stand_in_the_formula_of_a_law_of_it():
+    """That of the joint itself is wrong, as is any in that of another law."""
+    (kind,) = eighth.OF_EFFORT
+    chosen = {'turn': 2.0, 'phase': 0.3, 'source_effort': 4.0, 'source': 'wrist', 'kind': kind}
+    effect = {**EFFECT, 'parameters': {**P, **chosen}}
+    numbers = {'a': {'value': 0.5 / 4.0}, 'n': {'value': 2.0}, 'x': {'value': 0.3}}
+    law = 'tau_x[elbow] = a*tau[wrist]*sin(n*q[elbow] + x)'
+    finding = {'formula': law, 'parameters': numbers}
+    assert law_error(effect, finding) < 1e-12
+    assert law_error(effect, {**finding, 'formula': law.replace('sin', 'cos')}) > 0.1
+    assert law_error(effect, {**finding, 'formula': f'{law} + 0*tau[elbow]'}) == math.inf
+    for other in ('wrist', 'elbow'):
+        formula = f'{RIGHT["formula"]} + 0*tau[{other}]'
+        known = {**EFFECT, 'parameters': {**P, 'source': 'wrist'}}
+        assert law_error(known, {**RIGHT, 'formula': formula}) == math.inf
+
+
+@pytest.mark.parametrize(
+    ('is_prismatic', 'is_driven', 'is_suitable'),
+    [(False, True, True), (True, True, False), (False, False, False)],
+)
+def test_a_law_of_an_effort_needs_one_that_varies(is_prismatic, is_driven, is_suitable):
+    """Neither that of a slide, which may be its weight alone, nor of a joint without motor."""
+    bodies = [
+        SimpleNamespace(joint=x, is_prismatic=is_prismatic, is_driven=is_driven) for x in 'ab'
+    ]
+    motion = SimpleNamespace(
+        effort=np.array([3.0, 3.0]), velocity=np.ones(2), low=-np.ones(2), high=np.ones(2)
+    )
+    (kind,) = eighth.OF_EFFORT
+    seed, rng = EIGHTH_FROM + list(eighth.FAMILIES).index(kind), np.random.default_rng(3)
+    if is_suitable:
+        assert draw_unlisted(rng, seed, bodies, motion).values(1.0)['source_effort'] == 3.0
+        return
+    with pytest.raises(UnsuitableError, match='hardly varies'):
+        draw_unlisted(rng, seed, bodies, motion)
 
 
 @pytest.mark.parametrize(
