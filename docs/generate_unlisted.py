@@ -12,7 +12,8 @@ from sgp_proof.concealed.unlisted import SAME
 
 ROOT = Path(__file__).parents[1]
 TARGET = Path(__file__).parent / 'unlisted.md'
-RESULTS = ROOT / 'sgp_proof/results/unlisted_seventh.json'
+RESULTS = ROOT / 'sgp_proof/results/unlisted_eighth.json'
+SEVENTH = ROOT / 'sgp_proof/results/unlisted_seventh.json'
 SIXTH = ROOT / 'sgp_proof/results/unlisted_sixth.json'
 SIXTH_AGAIN = ROOT / 'sgp_proof/results/unlisted_sixth_again.json'
 FIFTH = ROOT / 'sgp_proof/results/unlisted_fifth.json'
@@ -38,7 +39,7 @@ def text():
     rows, summary = result['cases'], result['summary']
     earlier = {'first': FIRST, 'third': THIRD, 'again': AGAIN, 'fourth': FOURTH,
                'fourth_again': FOURTH_AGAIN, 'fifth': FIFTH, 'fifth_again': FIFTH_AGAIN,
-               'sixth': SIXTH, 'sixth_again': SIXTH_AGAIN}  # fmt: skip
+               'sixth': SIXTH, 'sixth_again': SIXTH_AGAIN, 'seventh': SEVENTH}  # fmt: skip
     known = {f'{name}_{key}': value for name, path in earlier.items()
              for key, value in _rates(path).items()}  # fmt: skip
     numbers = sorted(int(r['case'].rpartition('_')[2]) for r in rows)
@@ -50,6 +51,7 @@ def text():
         failures=_failures(rows), worlds=summary['worlds'],
         families=len({r['kind'] for r in rows}), found=_share(summary['found']),
         right=_share(summary['right_joint']), wrong=_share(summary['wrong_names']),
+        unexplained=sum(r['verdict'] == 'unexplained' for r in rows if not r['found']),
         sealed=result['sealed'], table=_table(rows), machines=_machines(), upper=100.0 * (1.0 - 0.05 ** (1.0 / summary['worlds'])),
         seeds=f'{numbers[0]}:{numbers[0] + result["sealed"]}', least=100.0 * LEAST_LAW,
     )  # fmt: skip
