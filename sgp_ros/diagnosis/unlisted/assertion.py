@@ -38,7 +38,7 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.unlisted.beside import PLAIN, acts_as_bodies, law_of, own_effects, says_less
 from sgp_ros.diagnosis.unlisted.search import search
 from sgp_ros.diagnosis.unlisted.searched import Searched
-from sgp_ros.diagnosis.unlisted.tried import promises
+from sgp_ros.diagnosis.unlisted.tried import leaves_less, promises
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Place
 
@@ -102,10 +102,11 @@ def with_laws(equations: Equations, comparison: Comparison, decision: Decision) 
 
 
 def _is_better(scale: Scale, searched: Searched, decision: Decision) -> bool:
-    """Return whether a formula or a smooth force is worth more than all that is asserted."""
-    *others, asserted = map(scale.of_forms().worth, (
-        searched.smooth, *searched.laws[:1], decision.tentative or decision.model))  # fmt: skip
-    return max(others) > asserted + ALIKE
+    """Return whether a force is worth more than all that is asserted, and leaves clearly less."""
+    asserted, forms = decision.tentative or decision.model, scale.of_forms()
+    least = forms.worth(asserted) + ALIKE
+    return any(forms.worth(m) > least and leaves_less(m, asserted, searched.joint)
+               for m in (searched.smooth, *searched.laws[:1]))  # fmt: skip
 
 
 def _bent(model: Model) -> set[int]:

@@ -638,12 +638,17 @@ def test_what_bent_bodies_and_rare_laws_say_is_asked_again(monkeypatch, equation
         assert asked == expected
 
 
-@pytest.mark.parametrize(('worth', 'is_better'), [(ALIKE + 1.0, True), (ALIKE - 1.0, False)])
-def test_a_form_is_better_than_all_that_is_asserted(worth, is_better):
-    """By more than a recording prefers between models that are alike."""
-    smooth, law, asserted = object(), object(), object()
-    worths = {smooth: 0.5 * worth, law: worth, asserted: 0.0}
-    scale = SimpleNamespace(of_forms=lambda: SimpleNamespace(worth=worths.__getitem__))
-    searched = SimpleNamespace(smooth=smooth, laws=(law, smooth))
+@pytest.mark.parametrize(
+    ('worth', 'left', 'is_better'),
+    [(ALIKE + 1.0, 0.1, True), (ALIKE - 1.0, 0.1, False), (ALIKE + 1.0, 0.6, False)],
+)
+def test_a_form_is_better_than_all_that_is_asserted(worth, left, is_better):
+    """By more than a recording prefers between models that are alike, and by what it leaves."""
+    known = ((0.5 * worth, left), (worth, left), (0.0, 1.0))
+    smooth, law, asserted = (
+        SimpleNamespace(worth=w, mean_square=np.array([9.0, x])) for w, x in known
+    )
+    scale = SimpleNamespace(of_forms=lambda: SimpleNamespace(worth=lambda m: m.worth))
+    searched = SimpleNamespace(joint=1, smooth=smooth, laws=(law, smooth))
     decision = SimpleNamespace(model=asserted, tentative=None)
     assert assertion._is_better(scale, searched, decision) is is_better
