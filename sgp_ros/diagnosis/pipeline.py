@@ -157,7 +157,7 @@ def _diagnosed(
     findings = doubted(findings, vain, tree.moving_names)
     verdict = verdict_of(decision, wrong, connected.findings, *connected.left, lags or differ)
     hidden = hides_friction(equations, comparison, decision) if verdict in _CALM else ()
-    traded = traded_remarks(whole, model, recordings.unstated)
+    traded = traded_remarks(whole, model, wrong, recordings.unstated)
     remarks = (*bound_remarks(decision), *on_z, *chain(*doubts.values()), *hidden, *traded)
     is_doubted = bool(hidden) or rests_on(doubts, findings, tree.moving_names)
     return Diagnosis(

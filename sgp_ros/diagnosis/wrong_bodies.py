@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -47,7 +47,9 @@ def parameter_errors(
     stated = equations.motion.tree.parameters
     alone, beside = (_numbers(equations, *_changed(m), stated, unstated)[0]
                      for m in (model, _with_offsets(equations, model)))  # fmt: skip
-    return tuple(filter(_differs, map(_widened, alone, beside)))
+    moved = {(e.link, e.parameter): e for e in beside}
+    return tuple(e for e in (_widened(e, moved.get((e.link, e.parameter), e)) for e in alone)
+                 if _differs(e))  # fmt: skip
 
 
 def _with_offsets(equations: Equations, model: Model) -> Model:
@@ -56,7 +58,9 @@ def _with_offsets(equations: Equations, model: Model) -> Model:
     loads = (EffectAt(CONSTANT_LOAD, place) for place in CONSTANT_LOAD.places(motion)
              if motion.moves[place.joint] and motion.tree.is_actuated[place.joint])  # fmt: skip
     more = (s for s in loads if s.key not in model.key)
-    return fit(Columns(equations), (*model.effects, *more), model.sigma, is_free=True, w=model.w)
+    effects = (*model.effects, *more)
+    return fit(Columns(equations), effects, model.sigma, is_free=True, w=model.w, rounds=2,
+               still=len(effects))  # fmt: skip
 
 
 def _widened(e: ParameterError, beside: ParameterError) -> ParameterError:
@@ -67,9 +71,10 @@ def _widened(e: ParameterError, beside: ParameterError) -> ParameterError:
 
 
 def traded_remarks(
-    equations: Equations, model: Model, unstated: Collection[int] = ()
-) -> Iterator[str]:
-    """Yield sentences on numbers that must differ beside those above, if the rest is as stated.
+    equations: Equations, model: Model, errors: Sequence[ParameterError],
+    unstated: Collection[int] = (),
+) -> Iterator[str]:  # fmt: skip
+    """Yield sentences on numbers that must differ beside `errors`, if the rest is as stated.
 
     Numbers of several bodies may do the same, so that none is known by itself. Of changes
     `x ~ N(x_hat, C)`, a set u costs `x_u' C_uu^-1 x_u / 2` nats if it stays as stated, and the
@@ -78,7 +83,7 @@ def traded_remarks(
     """
     if not model.is_free:
         return
-    told = {(e.link, e.parameter) for e in parameter_errors(equations, model, unstated)}
+    told = {(e.link, e.parameter) for e in errors}
     stated = equations.motion.tree.parameters
     model = _with_offsets(equations, model)
     numbers, C = _numbers(equations, model.w, _of_bodies(model), stated, unstated)

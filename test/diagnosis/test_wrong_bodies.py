@@ -5,9 +5,15 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from sgp_ros.diagnosis.wrong_bodies import parameter_errors, traded_remarks
+from sgp_ros.diagnosis.wrong_bodies import (
+    _changed,
+    _numbers,
+    parameter_errors,
+    traded_remarks,
+)
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, simulate
 
@@ -46,7 +52,8 @@ def test_numbers_that_trade_are_told_as_such(equations_for):
     chain = replace(first, mass=1.5 * first.mass), replace(second, centre=1.3 * second.centre)
     _, equations = equations_for(simulate(chain, 5))
     names = equations.motion.tree.link_names
-    (said,) = traded_remarks(equations, fitted(equations, is_free=True))
+    model = fitted(equations, is_free=True)
+    (said,) = traded_remarks(equations, model, parameter_errors(equations, model))
     centre = re.search(
         f'z of the centre of mass of {names[1]} -([0-9.]+) instead of -0.15 m', said
     )
@@ -59,4 +66,18 @@ def test_bodies_that_one_explains_trade_with_none(equations_for):
     first, second = CHAINS[2]
     chain = first, replace(second, centre=1.2 * second.centre)
     _, equations = equations_for(simulate(chain, 5))
-    assert not [*traded_remarks(equations, fitted(equations, is_free=True))]
+    model = fitted(equations, is_free=True)
+    assert not [*traded_remarks(equations, model, parameter_errors(equations, model))]
+
+
+def test_offsets_of_efforts_are_an_error_of_bodies(equations_for):
+    """A sensor that is off by a part of the weight moves a centre that is right."""
+    world = simulate(CHAINS[1], 5)
+    offset = 0.1 * np.sqrt((world.command**2).mean())
+    _, equations = equations_for(replace(world, command=world.command + offset))
+    model = fitted(equations, is_free=True)
+    stated = equations.motion.tree.parameters
+    by_chance = _numbers(equations, *_changed(model), stated, ())[0]
+    (alone,) = (e for e in by_chance if e.parameter == 'com_x')
+    assert abs(alone.value - alone.nominal) > 5.0 * alone.std
+    assert 'com_x' not in {e.parameter for e in parameter_errors(equations, model)}
