@@ -145,7 +145,7 @@ def test_what_is_found_with_an_error_of_the_connection_too_is_as_certain():
     ('offset', 'undone', 'is_alike'),
     [
         (0.0, {}, True),
-        pytest.param(0.0, {'effort_scale': -1.0}, False, marks=pytest.mark.long),
+        (0.0, {'effort_scale': -1.0}, False),
         pytest.param(0.4, {'offset': 0.4}, False, marks=pytest.mark.long),
     ],
 )

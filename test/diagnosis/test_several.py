@@ -88,7 +88,6 @@ def _difference(one, effect):
     return found
 
 
-@pytest.mark.long
 def test_two_recordings_of_one_machine_give_one_answer(found):
     """The friction that both have, and nothing that differs."""
     one = found('alike')

@@ -248,7 +248,6 @@ def half_known(equations_for):
     return equations_for(world)[1]
 
 
-@pytest.mark.long
 def test_what_is_known_of_a_joint_stands_beside_a_larger_unknown(half_known):
     comparison = compare_models(half_known, lambda _share: None)
     decision = decide(half_known, comparison)

@@ -82,7 +82,6 @@ def test_friction_that_grows_within_a_small_speed_keeps_its_name(
     assert is_creep(columns, adequate, listed, smooth, 0) is is_refined
 
 
-@pytest.mark.long
 def test_adequate_friction_keeps_its_name_against_an_earlier_speed(damped):
     """Not against a force of the speed now, of a position, nor where it is not adequate."""
     scale, columns = Scale.of(damped, compare_models(damped, lambda _: None)), Columns(damped)
