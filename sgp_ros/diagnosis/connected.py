@@ -27,6 +27,7 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.gathered import Recordings
 from sgp_ros.diagnosis.result import Equivalent, Finding
 from sgp_ros.diagnosis.setup.correction import Correction
+from sgp_ros.diagnosis.setup.evidence import Probe
 from sgp_ros.diagnosis.shown import LawSearch, Predictions
 from sgp_ros.physics.catalogue import COMMAND_DELAY, TORQUE_GAIN
 from sgp_ros.rigid.tree import Tree
@@ -175,7 +176,11 @@ def equations_of(
         state_cutoff = bandwidth.state_cutoff * most_hz / bandwidth.cutoff
         bandwidth = replace(bandwidth, cutoff=most_hz, state_cutoff=state_cutoff)
     require_rows(recordings.learned, bandwidth)
-    return lambda raw: make_equations(raw, tree, bandwidth, recordings.unstated)
+    accuracy = 1.0
+    if not (recordings.unstated or recordings.learned.approach is not None):
+        none = Correction.none(tree.size)
+        accuracy = Probe(recordings.learned, tree, bandwidth).agreement(none).accuracy
+    return lambda raw: make_equations(raw, tree, bandwidth, recordings.unstated, accuracy)
 
 
 def foreseen(plain: Connected, correction: Correction, tree: Tree) -> Connected:

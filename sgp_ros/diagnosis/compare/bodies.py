@@ -52,7 +52,9 @@ class Factor:
         return cls(Q, R)
 
 
-def body_directions(tree: Tree, unstated: Collection[int] = ()) -> np.ndarray:
+def body_directions(
+    tree: Tree, unstated: Collection[int] = (), accuracy: float = 1.0
+) -> np.ndarray:
     """Return changes of the inertial parameters, one standard deviation each, (p, 10 b).
 
     Per body: mass at the same centre and size, the centre along three axes, six entries of the
@@ -61,10 +63,11 @@ def body_directions(tree: Tree, unstated: Collection[int] = ()) -> np.ndarray:
     Args:
         tree: nominal robot.
         unstated: bodies that its file leaves open.
+        accuracy: by which the deviations of all others are multiplied.
     """
     rows = []
     for body, values in enumerate(tree.parameters):
-        spread = OPEN_SPREAD if body in unstated else SPREAD
+        spread = OPEN_SPREAD if body in unstated else SPREAD * accuracy
         mass = max(float(values[0]), 1e-6)
         c = values[1:4] / mass
         about = 0.5 * (values[4] + values[6] + values[9])
@@ -104,17 +107,18 @@ def shrinkage(directions: np.ndarray, tree: Tree, w: np.ndarray) -> float:
     return 0.5 * float(((np.log(size) ** 2 - (1.0 - size) ** 2) / spread**2).sum())
 
 
-def load_precision(directions: np.ndarray, tree: Tree) -> np.ndarray:
+def load_precision(directions: np.ndarray, tree: Tree, accuracy: float = 1.0) -> np.ndarray:
     """Return the inverse covariance of changes w (p,) with loads on outermost links, (p, p).
 
-    Without a load it is one. A load has a mass, a first moment and an inertia of their own, which
-    are unknown; a link without any inertia carries none.
+    Without a load it is `1 / accuracy^2`. A load has a mass, a first moment and an inertia of
+    their own, which are unknown; a link without any inertia carries none.
 
     Args:
         directions: (p, 10 b) of `body_directions`.
         tree: nominal robot.
+        accuracy: standard deviation of changes without a load.
     """
-    precision = np.eye(len(directions))
+    precision = np.eye(len(directions)) / accuracy**2
     mass = LOAD * float(tree.parameters[:, 0].sum())
     tool = _TOOL * float(np.linalg.norm(tree.translations, axis=1).sum())
     for tip in tree.outermost:
@@ -124,7 +128,7 @@ def load_precision(directions: np.ndarray, tree: Tree) -> np.ndarray:
             far = float(np.sqrt(max(about / float(values[0]), 1e-6))) + tool
             load = mass * np.array([1.0, far, far, far, *[far * far] * 6])
             X = np.linalg.solve(directions[own, own].T, np.diag(load))  # w of each load
-            precision[own, own] = np.linalg.inv(np.eye(10) + X @ X.T)
+            precision[own, own] = np.linalg.inv(accuracy**2 * np.eye(10) + X @ X.T)
     return precision
 
 

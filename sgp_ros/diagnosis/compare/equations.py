@@ -95,6 +95,7 @@ class Equations:
         loop: what holds the motion.
         free: the same equations where dry friction holds fewer joints, or None.
         instants: number of efforts whose instant is unknown: k where they are measured, else 0.
+        accuracy: errors of the robot file, relative to the usual prior.
     """
 
     motion: ObservedMotion
@@ -114,6 +115,7 @@ class Equations:
     loop: Loop
     free: Equations | None = None
     instants: int = 0
+    accuracy: float = 1.0
 
     @cached_property
     def factors(self) -> tuple[Factor, ...]:
@@ -257,8 +259,9 @@ def joint_name(motion: ObservedMotion, joint: int) -> str:
 
 
 def make_equations(
-    raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth, unstated: Collection[int] = ()
-) -> Equations:
+    raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth, unstated: Collection[int] = (),
+    accuracy: float = 1.0,
+) -> Equations:  # fmt: skip
     """Return the equations of a recording; a joint that does not move has rows of zeros.
 
     Args:
@@ -266,12 +269,13 @@ def make_equations(
         tree: nominal robot.
         bandwidth: of the filters.
         unstated: bodies that the robot's file leaves open.
+        accuracy: of the others, see `Equations`.
     """
     motion = observe(raw, tree, bandwidth)
     low = parallel_filter(raw, bandwidth)
     k = tree.size
     d = low(motion.nominal_effort - motion.effort - motion.stated_force) * motion.moves
-    directions = at_one_scale(body_directions(tree, unstated), motion)
+    directions = at_one_scale(body_directions(tree, unstated, accuracy), motion)
     m = k if motion.drive is None and not motion.is_static else 0
     bases = tuple(np.zeros((len(d), m + len(directions))) for _ in range(k))
     for rows, out in low.blocks(_BLOCK):
@@ -295,5 +299,6 @@ def make_equations(
         motion, low, motion.time[low.rows], d, bases, directions, power, np.sqrt(variance),
         np.ones(motion.position.shape), resting(raw, motion, bandwidth),
         error + noise, part_of_noise(noise, d), noise, carried, loop, instants=m,
+        accuracy=accuracy,
     )  # fmt: skip
     return replace(equations.with_dry_friction(motion.dry_joints), free=None)

@@ -103,7 +103,7 @@ def _ties(effects: Sequence[EffectAt]) -> np.ndarray:
 def _of_stated_bodies(model: Model, J: np.ndarray, inverse: np.ndarray) -> np.ndarray:
     """Return expected squares of the errors that those of the robot file make, (c + s, c + s).
 
-    Changes w of its bodies have the prior `N(0, STATED_ERROR^2 I)` and move the parameters by
+    Changes w of its bodies have the prior of `STATED_ERROR` and move the parameters by
     `G w`, `G = A^-1 J^T B`, with B their columns. What is left of B tells w from the residual.
 
     Args:
@@ -120,8 +120,8 @@ def _of_stated_bodies(model: Model, J: np.ndarray, inverse: np.ndarray) -> np.nd
         BB += R.T @ R
         JB += (rows[:, j].T @ factor.Q) @ R
         Br += R.T @ (factor.Q.T @ residual[:, j])
-    G = inverse @ JB
-    known = (BB - JB.T @ G) / model.frame.weight + np.eye(p) / STATED_ERROR**2
+    G, error = inverse @ JB, STATED_ERROR / equations.accuracy
+    known = (BB - JB.T @ G) / model.frame.weight + np.eye(p) / error**2
     left = Br - G.T @ (J[: N * k].T @ residual.ravel())
     w = np.linalg.solve(known, left / model.frame.weight)
     return np.asarray(G @ (np.linalg.inv(known) + np.outer(w, w)) @ G.T)

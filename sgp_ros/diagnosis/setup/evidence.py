@@ -4,9 +4,9 @@
 parameters and, per joint, viscous and dry friction, an offset and a rotor, each with a wide normal
 prior.
 The evidence has b integrated out (Laplace), for the nominal robot alone, with bodies, with
-friction too, and with a load; the best of these counts, so that an error of the connection must
-explain what all of them leave. Beside friction, rows where it may hold a joint say nothing of
-that joint.
+friction too, and with a load, each with errors of bodies as files may have and as most have; the
+best of these counts, so that an error of the connection must explain what all of them leave.
+Beside friction, rows where it may hold a joint say nothing of that joint.
 
 Where every joint has a recorded effort it is the evidence of the efforts, given the motion. A
 joint without a motor has none that tells the size of its bodies, and a drive makes its effort of
@@ -33,9 +33,14 @@ from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
 from sgp_ros.diagnosis.compare.rest import resting
 from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory, observe
 from sgp_ros.diagnosis.compare.volume import Loop, log_inertia, noisy_volume, part_of_noise
-from sgp_ros.diagnosis.criteria import FORCE_ACCURACY, INDEPENDENT_ROWS, SHAPE_ERROR
+from sgp_ros.diagnosis.criteria import (
+    FORCE_ACCURACY,
+    INDEPENDENT_ROWS,
+    SHAPE_ERROR,
+    STATED_ERROR,
+)
 from sgp_ros.diagnosis.setup.correction import Acting, Correction, delayed
-from sgp_ros.diagnosis.setup.unknowns import EVERYDAY, PLAIN, Agreement, Unknowns
+from sgp_ros.diagnosis.setup.unknowns import OF_BODIES, OF_ROTORS, SETS, Agreement, Unknowns
 from sgp_ros.physics.servo import Servo
 from sgp_ros.rigid.rigid_body import mass_matrix, torque_regressor
 from sgp_ros.rigid.tree import Tree
@@ -48,21 +53,12 @@ _PER_PERIOD = 8.0
 """Rows per period of the cut-off before the filter."""
 _WIDE = 2.5
 """Cut-off before rows are left out, by that of the filter: motion passes, what would alias not."""
-_ROUNDS = 4
 _KEPT = 50
 """Clock offsets of which the efforts are remembered."""
 _MOTIONS = 8
 """Corrected motions of which the columns are remembered."""
-_FRICTION = 2
-"""Number of the first set of unknowns with friction; the next has a load too."""
-SUDDEN = 4
-"""Number of the set with friction that turns at once, which `agreement` tries only if asked."""
-_NONE = 1e12
-"""Prior precision of what is not there."""
 _MOST_INACCURATE = 0.05
 """Share of an effort that is small beside the forces in it which these may leave."""
-FRICTION = 0.3
-"""Prior standard deviation of friction and offset, relative to the rms of the joint's effort."""
 
 
 class Probe:
@@ -117,7 +113,7 @@ class Probe:
         self._loop = Loop.of(motion, bandwidth.cutoff)
         inertia = self.motion.mass_diagonal.mean(axis=0)
         self._rotors = np.diag(inertia) if knows_bodies else None
-        self._load = load_precision(self.directions, tree)
+        self._loads = {a: load_precision(self.directions, tree, a) for a in (1.0, STATED_ERROR)}
         self._known: dict[float, Acting] = {}
         self._columns: dict[tuple[object, ...], tuple[Unknowns, Unknowns]] = {}
         self._moving = ~resting(raw, motion, bandwidth)[pick]
@@ -154,7 +150,7 @@ class Probe:
 
         Args:
             correction: what is undone.
-            unknowns: number of the set of unknowns; None for the best.
+            unknowns: number of the set of `SETS`; None for the best.
             nominal: see `Agreement`, of all that are compared; None for that of this correction.
         """
         motion = correction.motion(self.motion, self.acting(correction.clock))
@@ -170,13 +166,14 @@ class Probe:
         volume = float(noisy_volume(units, self._noise_part).sum())
         rows = min(INDEPENDENT_ROWS, len(both[0]))
         found = []
-        for number in range(4 if self._rotors is None else 3) if unknowns is None else (unknowns,):
-            d = both[number >= _FRICTION]
+        usual = OF_BODIES if self._rotors is None else OF_ROTORS
+        for number in usual if unknowns is None else (unknowns,):
+            kind = SETS[number]
+            d, within = both[kind.level >= 2], columns[kind.level >= 2]
             own = np.minimum((d**2).mean(axis=0) / power, 1.0)
             floor = self._floor(own if nominal is None else nominal) * power
-            value, rest, share, w = self._with(
-                number, d, columns[number >= _FRICTION], power, floor
-            )
+            precision = self._loads[kind.accuracy] if kind.level == 3 else None
+            value, rest, share, w = within.explained(kind, d, power, floor, precision)
             inertia = self._log_inertia(motion.tree, w, motion.position[self._pose])
             shift = float(self._loop.volume(inertia, correction.kp, correction.kd).sum())
             if np.isfinite(shift):  # else bodies that cannot be
@@ -246,41 +243,6 @@ class Probe:
         """Return the share of each effort, (k,), that no model explains."""
         floor = 1e-5 + SHAPE_ERROR * nominal
         return floor + self._inaccuracy if self.full.has_all_efforts else floor
-
-    def _with(
-        self, number: int, d: np.ndarray, unknowns: Unknowns, power: np.ndarray, floor: np.ndarray
-    ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
-        """Return the evidence of efforts, what is left, its share, and changes of bodies.
-
-        For a set of unknowns: none, bodies, these and friction, and a load too; or bodies and
-        friction that turns at once.
-        """
-        N, k = d.shape
-        rows = min(INDEPENDENT_ROWS, N)
-        p = unknowns.bodies.shape[2]
-        size = FRICTION * np.sqrt(power)
-        count = (0, p, p + EVERYDAY * k)[min(number, _FRICTION)]
-        prior = np.eye(count)
-        if number == _FRICTION + 1:
-            prior[:p, :p] = self._load
-        if number == SUDDEN:
-            built = [p + EVERYDAY * j + i for j in range(k) for i in range(PLAIN, EVERYDAY)]
-            prior[built, built] = _NONE
-        variance, left = (d**2).mean(axis=0) + floor, d
-        occam, b = 0.0, np.zeros(count)
-        products = unknowns.products(d, size) if count else None
-        for _ in range(_ROUNDS if products is not None else 0):
-            assert products is not None
-            A, g = (x[:count, ...] for x in products.weighted(rows / N / variance))
-            A = A[:, :count] + prior
-            b = np.linalg.solve(A, g)
-            left = d - unknowns.force(b, size)
-            variance = (left**2).mean(axis=0) + floor
-        if count:
-            occam = 0.5 * float(np.linalg.slogdet(A)[1] - np.linalg.slogdet(prior)[1])
-        share = variance / power
-        value = -0.5 * rows * float(np.log(share).sum()) - 0.5 * float(b @ prior @ b) - occam
-        return value, left, share, b[:p] if count else np.zeros(p)
 
 
 def _spread(segments: Sequence[slice], every: int, margin: int) -> list[np.ndarray]:

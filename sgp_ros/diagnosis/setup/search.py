@@ -12,9 +12,9 @@ from scipy import optimize
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, PER_EFFECT, PER_PARAMETER
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.errors import Hypothesis, hypotheses
-from sgp_ros.diagnosis.setup.evidence import SUDDEN, Probe
+from sgp_ros.diagnosis.setup.evidence import Probe
 from sgp_ros.diagnosis.setup.joint import Together, spread, value_of
-from sgp_ros.diagnosis.setup.unknowns import Agreement
+from sgp_ros.diagnosis.setup.unknowns import SUDDEN, Agreement
 
 _REFINED = 6
 """Hypotheses of which the numbers are searched to the end."""

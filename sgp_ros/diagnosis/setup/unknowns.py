@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
+from sgp_ros.diagnosis.criteria import INDEPENDENT_ROWS, STATED_ERROR
 from sgp_ros.physics.memory import bristle
 from sgp_ros.robots.observed_motion import ObservedMotion
 
@@ -15,6 +17,35 @@ PLAIN, EVERYDAY = 4, 8
 """Forces of a joint: viscous and dry friction, an offset, a rotor; these and presliding."""
 _PERIODS = (0.125, 0.4, 1.2, 3.6)
 """Times in which friction builds up, in periods of the cut-off."""
+_ROUNDS = 4
+_NONE = 1e12
+"""Prior precision of what is not there."""
+FRICTION = 0.3
+"""Prior standard deviation of friction and offset, relative to the rms of the joint's effort."""
+
+
+class Set(NamedTuple):
+    """Unknowns that are there.
+
+    Attributes:
+        level: 0 none, 1 bodies or rotors, 2 friction too, 3 a load too.
+        accuracy: errors of bodies of the robot file, relative to their usual prior.
+        builds_up: whether friction may.
+    """
+
+    level: int
+    accuracy: float
+    builds_up: bool = True
+
+
+SETS = (
+    Set(0, STATED_ERROR),
+    *(Set(level, accuracy) for accuracy in (1.0, STATED_ERROR) for level in (1, 2, 3)),
+    Set(2, 1.0, builds_up=False),
+)
+OF_BODIES, OF_ROTORS, SUDDEN = range(len(SETS) - 1), range(3), len(SETS) - 1
+"""Numbers of those that are compared with unknown bodies, and with known ones, and of that with
+friction that turns at once, which is tried only if asked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,8 +54,7 @@ class Agreement:
 
     Attributes:
         evidence: logarithm, best of the sets of unknowns [nats].
-        unknowns: number of the set that is best: 0 none, 1 bodies or rotors, 2 friction too, 3 a
-            load too.
+        unknowns: number of the set of `SETS` that is best.
         left: (k,) share of the mean squared effort that is left with them.
         discrepancy: (N, k) from the nominal robot, relative to the rms effort of each joint.
         rest: (N, k) what is left of it with the unknowns.
@@ -41,6 +71,11 @@ class Agreement:
     share: np.ndarray
     rows: float
     nominal: np.ndarray
+
+    @property
+    def accuracy(self) -> float:
+        """Errors of bodies of the robot file that explain it best, relative to the usual prior."""
+        return SETS[self.unknowns].accuracy
 
     def leaves_less(self, other: Agreement) -> bool:
         """Return whether less of the efforts is left; stiffer drives move with less error."""
@@ -154,3 +189,43 @@ class Unknowns:
         if len(b) > p:
             found += (self.friction * (b[p:].reshape(k, EVERYDAY) * size[:, None])).sum(axis=2)
         return found
+
+    def explained(
+        self, kind: Set, d: np.ndarray, power: np.ndarray, floor: np.ndarray,
+        precision: np.ndarray | None = None,
+    ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+        """Return the evidence of efforts, what is left, its share, and changes of bodies.
+
+        Args:
+            kind: unknowns that are there.
+            d: (N, k) discrepancy [N m or N].
+            power: (k,) mean squared efforts.
+            floor: (k,) mean squares that no model explains.
+            precision: (p, p) of the prior of bodies, where it is not that of their accuracy.
+        """
+        N, k = d.shape
+        rows = min(INDEPENDENT_ROWS, N)
+        p = self.bodies.shape[2]
+        size = FRICTION * np.sqrt(power)
+        count = (0, p, p + EVERYDAY * k)[min(kind.level, 2)]
+        prior = np.eye(count)
+        if count:
+            prior[:p, :p] = np.eye(p) / kind.accuracy**2 if precision is None else precision
+        if not kind.builds_up:
+            built = [p + EVERYDAY * j + i for j in range(k) for i in range(PLAIN, EVERYDAY)]
+            prior[built, built] = _NONE
+        variance, left = (d**2).mean(axis=0) + floor, d
+        occam, b = 0.0, np.zeros(count)
+        products = self.products(d, size) if count else None
+        for _ in range(_ROUNDS if products is not None else 0):
+            assert products is not None
+            A, g = (x[:count, ...] for x in products.weighted(rows / N / variance))
+            A = A[:, :count] + prior
+            b = np.linalg.solve(A, g)
+            left = d - self.force(b, size)
+            variance = (left**2).mean(axis=0) + floor
+        if count:
+            occam = 0.5 * float(np.linalg.slogdet(A)[1] - np.linalg.slogdet(prior)[1])
+        share = variance / power
+        value = -0.5 * rows * float(np.log(share).sum()) - 0.5 * float(b @ prior @ b) - occam
+        return value, left, share, b[:p] if count else np.zeros(p)

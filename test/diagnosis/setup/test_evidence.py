@@ -49,9 +49,9 @@ def test_efforts_that_are_recorded_prize_no_inertia(slow):
     world, *robot = slow
     probe = probe_of(replace(world, command=KGF_CM * world.command), *robot)
     none = Correction.none(1)
-    wrong = probe.agreement(replace(none, scale=np.full(1, 0.01)))
-    assert wrong.left[0] > 1.0
-    assert wrong.evidence < probe.agreement(none).evidence
+    far = replace(none, scale=np.full(1, 0.01))
+    assert probe.agreement(far, 0).left[0] > 1.0
+    assert probe.agreement(far).evidence < probe.agreement(none).evidence
 
 
 def test_less_of_a_rotor_than_stated_may_be(slow):

@@ -13,10 +13,11 @@ from sgp_ros.diagnosis.criteria import DOUBTED
 from sgp_ros.diagnosis.result import Finding, Location, Parameter
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.errors import hypotheses
-from sgp_ros.diagnosis.setup.evidence import SUDDEN, Probe
+from sgp_ros.diagnosis.setup.evidence import Probe
 from sgp_ros.diagnosis.setup.joint import Together
 from sgp_ros.diagnosis.setup.said import doubted_scales
 from sgp_ros.diagnosis.setup.search import _gain, _refined, search
+from sgp_ros.diagnosis.setup.unknowns import SUDDEN
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.formula import read_formula
