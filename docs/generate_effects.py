@@ -9,7 +9,7 @@ from pathlib import Path
 
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.grammar import FUNCTIONS
-from sgp_ros.physics.parts import LAST
+from sgp_ros.physics.place import LAST
 
 TARGET = Path(__file__).parent / 'effects.md'
 PICTURES = Path(__file__).parent / 'images' / 'effects'

@@ -8,7 +8,7 @@ from sgp_proof.concealed.unknown import NAME, UNKNOWN
 from sgp_proof.concealed.unlisted import constants, family_of
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.drawing import Scene, UnsuitableError
-from sgp_ros.physics.parts import MOTOR
+from sgp_ros.physics.place import MOTOR
 
 
 def draw_effect(rng, name, bodies, motion, is_hard):

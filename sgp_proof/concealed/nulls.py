@@ -29,7 +29,7 @@ from sgp_proof.concealed.unknown import NAME as OUTSIDE
 from sgp_proof.result_files import RESULTS, seed_range, write_result
 from sgp_ros.apps.simulation import write_simulated
 from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
-from sgp_ros.diagnosis.compare.equations import joint_name, make_equations
+from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.diagnosis.decide.cross_validation import structure
 from sgp_ros.diagnosis.decide.decision import decide
@@ -38,6 +38,7 @@ from sgp_ros.diagnosis.decide.visibility import hides_friction
 from sgp_ros.diagnosis.explain.comparison import compare_models
 from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG
 from sgp_ros.physics.drawing import UnsuitableError
+from sgp_ros.physics.place import joint_name
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.urdf_robot import nominal_tree

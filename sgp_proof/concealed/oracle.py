@@ -25,7 +25,7 @@ from sgp_proof.concealed.balance import RATE_HZ, WIDTH_S, low_passed
 from sgp_proof.concealed.scoring import HELD_OUT, parameter_scores
 from sgp_proof.concealed.unknown import NAME, UNKNOWN
 from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
-from sgp_ros.diagnosis.compare.equations import joint_name, make_equations
+from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import floors
@@ -35,7 +35,8 @@ from sgp_ros.diagnosis.prove.proof import prove
 from sgp_ros.physics.catalogue import BACKLASH, EFFECTS
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place, Quantity
+from sgp_ros.physics.parts import Quantity
+from sgp_ros.physics.place import Place, joint_name
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.nominal import nominal_model
 from sgp_ros.robots.registry import load_robot

@@ -14,7 +14,7 @@ from sgp_proof.concealed.balance import Balance
 from sgp_proof.concealed.unknown import NAME
 from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG
 from sgp_ros.physics.drawing import UnsuitableError
-from sgp_ros.physics.parts import PLACES
+from sgp_ros.physics.place import PLACES
 
 SMALLEST_SHARE = 0.0042
 LEAST_BEYOND, MOST_BEYOND, MOST_OF_ALL = 0.05, 0.4, 0.6

@@ -24,14 +24,14 @@ from sgp_proof.concealed.scoring import rate
 from sgp_proof.result_files import RESULTS, seed_range, write_result
 from sgp_ros.apps.simulation import write_simulated
 from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
-from sgp_ros.diagnosis.compare.equations import joint_name, make_equations
+from sgp_ros.diagnosis.compare.equations import make_equations
 from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.diagnosis.decide.decision import decide
 from sgp_ros.diagnosis.decide.visibility import visibility
 from sgp_ros.diagnosis.explain.comparison import compare_models
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.drawing import UnsuitableError
-from sgp_ros.physics.parts import PLACES
+from sgp_ros.physics.place import PLACES, joint_name
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.urdf_robot import nominal_tree

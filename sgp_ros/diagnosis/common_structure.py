@@ -15,7 +15,7 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.unlisted.beside import PLAIN
 from sgp_ros.physics.effect_at import EffectAt, one_of_each
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 _STEPS = 8

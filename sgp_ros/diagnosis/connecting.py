@@ -14,7 +14,6 @@ from dataclasses import replace
 import numpy as np
 
 from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
-from sgp_ros.diagnosis.compare.equations import joint_name
 from sgp_ros.diagnosis.connected import Connected, compared, foreseen
 from sgp_ros.diagnosis.criteria import (
     ALIKE,
@@ -38,6 +37,7 @@ from sgp_ros.diagnosis.setup.said import (
 from sgp_ros.diagnosis.setup.search import Connection, Tried, search
 from sgp_ros.diagnosis.unlisted.statement import extended
 from sgp_ros.physics.catalogue import TORQUE_GAIN
+from sgp_ros.physics.place import joint_name
 from sgp_ros.rigid.tree import Tree
 
 _CORRECTED = 'All other results are for the recording corrected in this way.'

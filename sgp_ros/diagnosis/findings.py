@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sgp_ros.diagnosis.compare.equations import Equations, joint_name
+from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.compare.velocity_sensor import SensorLag
 from sgp_ros.diagnosis.criteria import (
     COUNTED_SHARE,
@@ -32,6 +32,7 @@ from sgp_ros.diagnosis.shown import Dependence
 from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG, VISCOUS_FRICTION
 from sgp_ros.physics.drive import Drive
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.place import joint_name
 from sgp_ros.physics.servo import Servo
 from sgp_ros.robots.observed_motion import ObservedMotion
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sgp_ros.diagnosis.common_structure import Side, common_models
-from sgp_ros.diagnosis.compare.equations import Equations, joint_name
+from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, LEAST_SHARE, MOST_CERTAIN, PER_EFFECT, TEMPER
 from sgp_ros.diagnosis.decide.differences import Several
 from sgp_ros.diagnosis.findings import stated_parameters
@@ -27,7 +27,7 @@ from sgp_ros.diagnosis.result import Finding, Location, Parameter, ParameterErro
 from sgp_ros.diagnosis.wrong_bodies import parameter_errors
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place, joint_name
 
 
 @dataclass(frozen=True, eq=False)

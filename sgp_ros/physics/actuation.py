@@ -10,11 +10,11 @@ import numpy as np
 from sgp_ros.physics.drawing import Drawn, JointScene, Scene
 from sgp_ros.physics.effect import EMPTY, Effect, Numbers
 from sgp_ros.physics.motion import Commands, SeenMotion
-from sgp_ros.physics.parts import MOTOR, PLACES, Place, Placed, Quantity, Value, relative_scales
+from sgp_ros.physics.parts import Quantity, Value, relative_scales
+from sgp_ros.physics.place import MOTOR, PLACES, Place, Placed
 
 Characteristic = Callable[[np.ndarray], np.ndarray]
 _MECHATRONICS = 'Isermann 2005, Mechatronic Systems'
-_ALL = PLACES['all']
 CONNECTED = 0.05
 """Part of its command that a motor delivers at least; what delivers less does not drive."""
 
@@ -292,7 +292,7 @@ class CommandDelay(_Late):
     def places(self, motion: SeenMotion) -> list[Place]:
         """Return each motor, and all of them together."""
         motors = super().places(motion)
-        return [*motors, Place(_ALL)] if len(motors) > 1 else motors
+        return [*motors, Place(PLACES['all'])] if len(motors) > 1 else motors
 
     def draw(self, scene: Scene) -> Drawn:
         """Return a delay of one motor, or of all."""

@@ -9,7 +9,8 @@ import numpy as np
 from sgp_ros.physics.drawing import Drawn, Scene, UnsuitableError
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.motion import SeenMotion
-from sgp_ros.physics.parts import BASE, LAST, TOOL, Place, Placed, Quantity
+from sgp_ros.physics.parts import Quantity
+from sgp_ros.physics.place import BASE, LAST, TOOL, Place, Placed
 
 GRAVITY = 9.81
 _MECHANICS = 'Khalil and Dombre 2002, Modeling, Identification and Control of Robots, chapter 9'

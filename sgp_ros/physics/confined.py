@@ -11,7 +11,8 @@ from sgp_ros.physics.drawing import Drawn, Scene, UnsuitableError
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.friction import KINDS, rubbing
 from sgp_ros.physics.motion import SeenMotion
-from sgp_ros.physics.parts import Place, Placed, Quantity, Value
+from sgp_ros.physics.parts import Quantity, Value
+from sgp_ros.physics.place import Place, Placed
 
 _BINS = 40
 

@@ -8,7 +8,8 @@ from sgp_ros.physics.drawing import Drawn, Scene, UnsuitableError
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.loads import MECHANICS
 from sgp_ros.physics.motion import SeenMotion
-from sgp_ros.physics.parts import MOTOR, Place, Placed, Quantity
+from sgp_ros.physics.parts import Quantity
+from sgp_ros.physics.place import MOTOR, Place, Placed
 
 _LOPSIDED = 10.0
 """Ratio of two motions in their sum from which the smaller one is 1 % of the mean square."""

@@ -14,23 +14,8 @@ import numpy as np
 
 from sgp_ros.physics.drawing import Drawn, JointScene, Scene
 from sgp_ros.physics.motion import SeenMotion, Structure
-from sgp_ros.physics.parts import (
-    BASE,
-    JOINT,
-    LAST,
-    MOTOR,
-    TOOL,
-    OwnMotion,
-    Place,
-    Placed,
-    Quantity,
-    Site,
-    SmallEffect,
-    TermForm,
-    Value,
-    propagated,
-    side_word,
-)
+from sgp_ros.physics.parts import OwnMotion, Quantity, SmallEffect, TermForm, Value, propagated
+from sgp_ros.physics.place import BASE, JOINT, LAST, MOTOR, TOOL, Place, Placed, Site, side_word
 from sgp_ros.physics.waves import Wave
 
 EMPTY = np.zeros(0)

@@ -11,7 +11,8 @@ from sgp_ros.physics.actuation import Characteristic, Drive
 from sgp_ros.physics.effect import EMPTY, Effect, Numbers
 from sgp_ros.physics.in_series import behind
 from sgp_ros.physics.motion import SeenMotion, Structure
-from sgp_ros.physics.parts import NOWHERE, PLACES, Place, Quantity, Value
+from sgp_ros.physics.parts import Quantity, Value
+from sgp_ros.physics.place import NOWHERE, PLACES, Place, place_of_word
 
 _AT_BOUND = 1e-6
 """Distance from a bound, in scales of the search, within which a number is at it."""
@@ -64,7 +65,7 @@ class EffectAt:
         words = {'kind' if k == effect.kind_word else k: x
                  for k, x in parameters.items() if isinstance(x, str)}  # fmt: skip
         numbers = {k: x for k, x in parameters.items() if not isinstance(x, str)}
-        place = Place.of(effect.edge, joint, words, numbers, tree)
+        place = Place.of(effect.site, effect.edge, joint, words, numbers, tree)
         if not effect.is_force:
             return cls(effect, place, joint=joint, parameters=parameters)
         shape, coefficients = effect.model(numbers, place.kind)
@@ -77,7 +78,9 @@ class EffectAt:
 
         Whoever knows the robot finds the place by the name of the joint.
         """
-        return cls(effect, Place(PLACES.get(joint, NOWHERE)), joint=joint, parameters=parameters)
+        word = place_of_word(joint, effect.site)
+        at = Place(NOWHERE if word is None else word)
+        return cls(effect, at, joint=joint, parameters=parameters)
 
     @property
     def name(self) -> str:

@@ -19,15 +19,8 @@ from sgp_ros.physics.effect import Effect, Numbers
 from sgp_ros.physics.hidden_states import behind, derivatives, on_spring, resonator, smooth
 from sgp_ros.physics.memory import BARE, BEYOND
 from sgp_ros.physics.motion import SeenMotion, Structure
-from sgp_ros.physics.parts import (
-    MOTOR,
-    Place,
-    Placed,
-    Quantity,
-    SmallEffect,
-    Value,
-    relative_scales,
-)
+from sgp_ros.physics.parts import Quantity, SmallEffect, Value, relative_scales
+from sgp_ros.physics.place import MOTOR, Place, Placed
 
 _POSES = 200
 _MOST_OF_LINK = 0.95

@@ -11,17 +11,15 @@ from sgp_ros.physics.effect import Effect, Numbers
 from sgp_ros.physics.motion import SeenMotion
 from sgp_ros.physics.parts import (
     COULOMB,
-    MOTOR,
     VISCOUS,
     OwnMotion,
-    Place,
-    Placed,
     Quantity,
     TermForm,
     Value,
     leaves_some,
     relative_scales,
 )
+from sgp_ros.physics.place import MOTOR, Place, Placed
 
 KINDS = (COULOMB, VISCOUS)
 SELF_LOCKING = 0.5

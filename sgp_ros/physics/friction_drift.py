@@ -10,7 +10,8 @@ from sgp_ros.physics.drawing import Drawn, JointScene
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.friction import KINDS, rubbing
 from sgp_ros.physics.motion import SeenMotion
-from sgp_ros.physics.parts import Place, Placed, Quantity, Value, relative_scales
+from sgp_ros.physics.parts import Quantity, Value, relative_scales
+from sgp_ros.physics.place import Place, Placed
 
 WARM_S, WARM_SPREAD = 10.0, 0.7
 """Time constant below which a warm-up is unlikely [s], spread of its logarithm [1]. Convention."""

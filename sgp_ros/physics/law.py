@@ -20,14 +20,8 @@ from sgp_ros.physics.effect import Effect, Numbers
 from sgp_ros.physics.formula import Formula, read_formula
 from sgp_ros.physics.grammar import MEMORY, TIME
 from sgp_ros.physics.motion import SeenMotion, Structure
-from sgp_ros.physics.parts import (
-    LawParameter,
-    Place,
-    Placed,
-    Quantity,
-    Value,
-    relative_scales,
-)
+from sgp_ros.physics.parts import LawParameter, Quantity, Value, relative_scales
+from sgp_ros.physics.place import Place, Placed
 from sgp_ros.physics.term import Motion
 
 NAME = 'law'

@@ -9,15 +9,8 @@ import numpy as np
 from sgp_ros.physics.drawing import Drawn, JointScene
 from sgp_ros.physics.effect import EMPTY, Effect, Numbers
 from sgp_ros.physics.motion import SeenMotion
-from sgp_ros.physics.parts import (
-    OwnMotion,
-    Place,
-    Placed,
-    Quantity,
-    TermForm,
-    Value,
-    leaves_some,
-)
+from sgp_ros.physics.parts import OwnMotion, Quantity, TermForm, Value, leaves_some
+from sgp_ros.physics.place import Place, Placed
 from sgp_ros.physics.waves import Wave, most_periods, peak_width, per_turn
 
 MECHANICS = 'Khalil and Dombre 2002, Modeling, Identification and Control of Robots, chapter 9'

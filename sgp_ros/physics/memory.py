@@ -11,7 +11,8 @@ from numba import njit
 from sgp_ros.physics.drawing import Drawn, JointScene, Scene, UnsuitableError
 from sgp_ros.physics.effect import Effect, Numbers
 from sgp_ros.physics.motion import SeenMotion, Structure
-from sgp_ros.physics.parts import MOTOR, Place, Placed, Quantity, Value, relative_scales
+from sgp_ros.physics.parts import Quantity, Value, relative_scales
+from sgp_ros.physics.place import MOTOR, Place, Placed
 
 _POSES = 200
 BARE = 'motor beside'

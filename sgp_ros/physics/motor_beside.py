@@ -15,7 +15,7 @@ from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.elasticity import JointElasticity, is_on_motor, some_poses
 from sgp_ros.physics.memory import BARE
 from sgp_ros.physics.motion import SeenMotion
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 
 _MOST_OF_MOTOR = 0.5
 """Of the inertia in the robot file, from which on a rotor beside it is the motor."""

@@ -18,7 +18,8 @@ from sgp_ros.physics.drawing import Drawn, Scene, UnsuitableError
 from sgp_ros.physics.effect import Effect, Numbers
 from sgp_ros.physics.hidden_states import derivatives, resonator, smooth
 from sgp_ros.physics.motion import SeenMotion
-from sgp_ros.physics.parts import BASE, Place, Placed, Quantity, Value, relative_scales
+from sgp_ros.physics.parts import Quantity, Value, relative_scales
+from sgp_ros.physics.place import BASE, Place, Placed
 
 AXES = ('x', 'y', 'z')
 _SOFTEST_HZ = 0.3

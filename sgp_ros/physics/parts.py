@@ -1,102 +1,22 @@
-"""Parts of an effect: place, parameters, the form of its term, its first order."""
+"""Parts of an effect: parameters, the form of its term, its first order."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from enum import Enum
-from typing import Protocol
 
 import numpy as np
 
-from sgp_ros.physics.motion import SeenMotion, Structure
+from sgp_ros.physics.motion import SeenMotion
+from sgp_ros.physics.place import Place, Placed
 
 Value = float | str
 
-PLACES = {'base': -1, 'tool': -2, 'all': -3}
-"""Words for places other than joints."""
-NOWHERE = -4
-"""Place of an effect whose robot is not known."""
-SIDES = {'lower': -1, 'upper': 1}
 _ALL_OFF = 1.1
 """Part of a stated number that a law may take off: all of it, if its unit is a tenth off."""
 COULOMB, VISCOUS = 'coulomb', 'viscous'
 """Kinds of friction: over the direction of the motion, and over its velocity."""
-
-
-class Site(Enum):
-    """Part of a robot that an effect may be put on."""
-
-    JOINT = 'a joint'
-    MOTOR = 'a motor'
-    LAST = 'an outermost link of a URDF'
-    BASE = 'base'
-    TOOL = 'tool'
-
-
-JOINT, MOTOR, LAST, BASE, TOOL = Site
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Where an effect acts, and in which variant.
-
-    Attributes:
-        joint: index of the joint, or one of `PLACES`.
-        kind: such as `coulomb` or `viscous`; empty where there is but one.
-        source: index of the joint it comes from; -1 where there is none.
-        side: 1 or -1 for an effect at one end of the range; 0 elsewhere.
-        number: 0, or 1, 2, ... of further waves, or a second motor, of the same law there.
-    """
-
-    joint: int
-    kind: str = ''
-    source: int = -1
-    side: int = 0
-    number: int = 0
-
-    @classmethod
-    def of(
-        cls, edge: str, joint: str, words: Mapping[str, str], numbers: Mapping[str, float],
-        tree: Structure,
-    ) -> Place:  # fmt: skip
-        """Return the place that a file states.
-
-        Args:
-            edge: number that says where an effect at one end of the range begins; empty for
-                others. The side is the nearer end, unless the word `side` says it.
-            joint: name of a joint that moves on its own, or one of `PLACES`.
-            words: `kind`, `source_joint` and `side`, where there are such.
-            numbers: the stated ones.
-            tree: the robot.
-
-        Raises:
-            ValueError: a joint that does not move on its own.
-        """
-        names = tree.moving_names
-        at = PLACES[joint] if joint in PLACES else names.index(joint)
-        source = names.index(words['source_joint']) if 'source_joint' in words else -1
-        side = 0
-        if edge:
-            side = SIDES[words['side']] if 'side' in words else _side(tree, at, numbers[edge])
-        return cls(at, words.get('kind', ''), source, side)
-
-
-class Placed(Protocol):
-    """A place with shape and coefficients, as a law reads them."""
-
-    @property
-    def place(self) -> Place:
-        """Place where it acts."""
-
-    @property
-    def shape(self) -> np.ndarray:
-        """Shape, (s,)."""
-
-    @property
-    def coefficients(self) -> np.ndarray:
-        """Coefficients of the columns, (m,)."""
 
 
 def leaves_some(quantity: Quantity, at: Placed, motion: SeenMotion) -> bool:
@@ -111,19 +31,6 @@ def leaves_some(quantity: Quantity, at: Placed, motion: SeenMotion) -> bool:
     """
     stated = motion.stated_number(quantity.joint_number, at.place.joint)
     return bool(at.coefficients[0] > -_ALL_OFF * stated)
-
-
-def side_word(side: int) -> str:
-    """Return the word for a side of the range."""
-    return 'upper' if side > 0 else 'lower'
-
-
-def _side(tree: Structure, joint: int, edge: float) -> int:
-    """Return the nearer end of the range; without limits, which side of zero."""
-    lower, upper = float(tree.lower[joint]), float(tree.upper[joint])
-    if not (math.isfinite(lower) and math.isfinite(upper)):
-        return 1 if edge > 0.0 else -1
-    return 1 if upper - edge < edge - lower else -1
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,8 @@ from sgp_ros.physics.drawing import Drawn, JointScene
 from sgp_ros.physics.effect import Effect, Numbers
 from sgp_ros.physics.loads import wave_coefficients
 from sgp_ros.physics.motion import SeenMotion
-from sgp_ros.physics.parts import Place, Placed, Quantity, SmallEffect, Value
+from sgp_ros.physics.parts import Quantity, SmallEffect, Value
+from sgp_ros.physics.place import Place, Placed
 from sgp_ros.physics.waves import Wave, most_periods, peak_width, per_turn
 
 _NEWTON = 6

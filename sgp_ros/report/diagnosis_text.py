@@ -17,9 +17,11 @@ from sgp_ros.diagnosis.result import (
     ParameterError,
     Proof,
 )
+from sgp_ros.diagnosis.setup.errors import ORIENTATION
 from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.physics.catalogue import EFFECTS, words_of
 from sgp_ros.physics.parts import COULOMB
+from sgp_ros.physics.place import BASE, place_of_word
 
 UNKNOWN = 'unknown'
 """Name of what no effect of the catalogue describes."""
@@ -123,7 +125,13 @@ def effect_name(finding: Finding | Difference) -> str:
 
 def place(finding: Finding | Difference) -> str:
     """Return where an effect acts, in plain words."""
-    return _PLACES.get(finding.joint, f'on {finding.joint}')
+    return _where(finding.effect, finding.joint)
+
+
+def _where(effect: str, joint: str) -> str:
+    site = EFFECTS[effect].site if effect in EFFECTS else BASE if effect == ORIENTATION else None
+    is_joint = place_of_word(joint, site) is None
+    return f'on {joint}' if is_joint else _PLACES[joint]
 
 
 def numbers(finding: Finding | Difference) -> list[str]:
@@ -210,9 +218,7 @@ def equivalence_sentence(found: Equivalent, asserted: Sequence[tuple[str, str]] 
 
 def _listed(effects: Sequence[tuple[str, str]]) -> str:
     """Return effects at their joints, such as `a spring on elbow and a delay on all joints`."""
-    parts = [
-        f'{plain_name(effect)} {_PLACES.get(joint, f"on {joint}")}' for joint, effect in effects
-    ]
+    parts = [f'{plain_name(effect)} {_where(effect, joint)}' for joint, effect in effects]
     return f'{", ".join(parts[:-1])} and {parts[-1]}' if parts[1:] else ''.join(parts)
 
 

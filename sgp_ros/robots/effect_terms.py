@@ -17,7 +17,7 @@ import numpy as np
 
 from sgp_ros.physics.effect_at import EffectAt, in_series
 from sgp_ros.physics.motion import Commands
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from sgp_ros.physics.term import Coefficient, Motion, Term
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.observed_motion import ObservedMotion

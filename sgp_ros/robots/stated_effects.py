@@ -19,7 +19,8 @@ from sgp_ros.physics.catalogue import COULOMB_FRICTION, EFFECTS, VISCOUS_FRICTIO
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.law import NAME as LAW
-from sgp_ros.physics.parts import BASE, LAST, SIDES, TOOL, Quantity, Value
+from sgp_ros.physics.parts import Quantity, Value
+from sgp_ros.physics.place import BASE, LAST, SIDES, TOOL
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.entries import Entries, is_positive
 from sgp_ros.robots.nominal_prior import stated_dynamics

@@ -21,7 +21,7 @@ from sgp_ros.errors import ConfigError
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.joint_terms import Shape, term_laws
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from sgp_ros.rigid.inertial import PARAMETERS
 from sgp_ros.rigid.pseudo_inertia import is_consistent, pseudo_inertia
 from sgp_ros.rigid.tree import Tree, read_urdf

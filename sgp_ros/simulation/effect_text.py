@@ -14,7 +14,8 @@ from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.example import example_effect
 from sgp_ros.physics.law import FormulaLaw
-from sgp_ros.physics.parts import BASE, TOOL, Value
+from sgp_ros.physics.parts import Value
+from sgp_ros.physics.place import BASE, TOOL
 from sgp_ros.simulation.effects import EffectParameter, Law
 from sgp_ros.simulation.formula_law import formula_law
 from sgp_ros.simulation.registry import LAWS

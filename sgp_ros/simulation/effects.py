@@ -15,7 +15,8 @@ import numpy as np
 
 from sgp_ros.errors import ConfigError
 from sgp_ros.physics.effect import Effect
-from sgp_ros.physics.parts import SIDES, Quantity, Value
+from sgp_ros.physics.parts import Quantity, Value
+from sgp_ros.physics.place import SIDES
 from sgp_ros.simulation.mechanism import Mechanism, SimulatedJoint
 
 

@@ -9,7 +9,7 @@ from sgp_ros.errors import ConfigError
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.law import NAME as LAW
-from sgp_ros.physics.parts import BASE, JOINT, LAST, MOTOR, TOOL
+from sgp_ros.physics.place import BASE, JOINT, LAST, MOTOR, TOOL
 from sgp_ros.simulation.effect_text import checked_law, with_defaults
 from sgp_ros.simulation.effects import EVERY_MOTOR, Action
 from sgp_ros.simulation.mechanism import Mechanism, SimulatedJoint, physical_parameters

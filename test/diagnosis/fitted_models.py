@@ -11,7 +11,7 @@ from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 
 
 def fitted(equations, *names, is_free=False):

@@ -14,7 +14,7 @@ from sgp_ros.diagnosis.explain.fitted_model import first_scale
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 
 NUMBERS = {
     'asymmetric_coulomb': {'real': [13.0, 35.0], 'sim': [55.0, -7.5]},

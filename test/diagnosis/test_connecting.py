@@ -16,7 +16,7 @@ from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.search import Connection, Tried
 from sgp_ros.physics.catalogue import TORQUE_GAIN
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 
 
 def _of(cutoff, verdict='missing_physics'):

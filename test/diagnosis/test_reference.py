@@ -12,7 +12,7 @@ from sgp_ros.diagnosis.reference import _judged, _sized, against_model, against_
 from sgp_ros.diagnosis.result import Finding, Location, Parameter
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 
 CASES = Path(__file__).parents[3] / 'shared' / 'practice2' / 'cases'
 ANSWERS = CASES.parent / 'answers'

@@ -14,7 +14,7 @@ from sgp_ros.diagnosis.compare.velocity_sensor import lagged, sensor_lags
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.physics.catalogue import EFFECTS as LAWS
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from sgp_ros.report.diagnosis_text import phrase
 from sgp_ros.report.verdict import verdict_sentence
 from sgp_ros.robots.stated_effects import read_effects, typical_motion

@@ -14,7 +14,8 @@ from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.confined import inside
 from sgp_ros.physics.drive import Drive
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place, Quantity
+from sgp_ros.physics.parts import Quantity
+from sgp_ros.physics.place import Place
 from sgp_ros.rigid.rigid_body import mass_matrix
 from sgp_ros.rigid.tree import read_urdf
 from sgp_ros.robots.observed_motion import ObservedMotion

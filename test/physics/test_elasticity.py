@@ -24,7 +24,7 @@ from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.elasticity import twist_of
 from sgp_ros.physics.hidden_states import behind, resonator
 from sgp_ros.physics.memory import BARE
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from sgp_ros.rigid.tree import read_urdf
 from sgp_ros.robots.observed_motion import ObservedMotion
 from sgp_ros.simulation.assembly import make_simulation

@@ -7,7 +7,7 @@ import pytest
 
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt, in_series
-from sgp_ros.physics.parts import PLACES, Place
+from sgp_ros.physics.place import PLACES, Place
 from test.physics.test_effects import MOTION
 
 DELAY, WIDTH, LIMIT, GAIN, LAG = 0.023, 0.3, 1.1, 0.8, 0.05

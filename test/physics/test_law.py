@@ -10,7 +10,7 @@ import pytest
 from sgp_ros.physics.catalogue import EFFECTS, drawn_over, exerts_force
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.formula import read_formula
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from sgp_ros.robots.stated_effects import read_effects
 from test.physics.test_effects import MOTION, STEP, TREE
 

@@ -12,7 +12,7 @@ from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.drive import Drive
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.memory import BARE
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from sgp_ros.rigid.tree import read_urdf
 from sgp_ros.robots.observed_motion import ObservedMotion
 from test.rigid.test_tree import ARM, FINGER
@@ -42,6 +42,8 @@ CASES = [
     for effect in EFFECTS.values()
     for place in {(p.kind, p.side): p for p in effect.places(MOTION)}.values()
 ]
+
+_OTHER = {-1: 'base', -2: 'tool', -3: 'all'}
 
 
 def _id(value):
@@ -93,13 +95,26 @@ def test_what_was_reported_is_stated_at_the_same_place(effect, place):
     assert hidden.any() == (effect.name == 'backlash')
     np.testing.assert_allclose(again[~hidden], shape[~hidden], rtol=1e-12)
     np.testing.assert_allclose(d, c, rtol=1e-12)
-    names = {-1: 'base', -2: 'tool', -3: 'all'}
-    joint = names.get(place.joint) or MOTION.tree.joint_names[place.joint]
+    joint = _OTHER.get(place.joint) or MOTION.tree.joint_names[place.joint]
     words = effect.stated_words(place, MOTION.tree)
     assert words.items() >= {k: v for k, v in report.items() if isinstance(v, str)}.items()
     own = 'motor' if effect.kinds else ''
     stated = replace(place, kind=own) if place.kind == BARE else place
     assert EffectAt.stated(effect, joint, numbers | words, MOTION.tree).place == stated
+
+
+@pytest.mark.parametrize('effect', EFFECTS.values(), ids=_id)
+def test_a_joint_may_be_called_like_a_place_of_another_law(effect):
+    """A law of a joint called `base` is on that joint, one of the base is on the base."""
+    names = 'base', 'tool', *MOTION.tree.joint_names[2:]
+    tree = replace(MOTION.tree, joint_names=names)
+    for place in effect.places(replace(MOTION, tree=tree)):
+        joint = names[place.joint] if place.joint >= 0 else _OTHER[place.joint]
+        words = effect.stated_words(place, tree)
+        values = _values(effect, place.kind, 0)
+        at = EffectAt.stated(effect, joint, values | words, tree).place.joint
+        assert at == place.joint
+        assert (EffectAt.wanted(effect, joint, values).place.joint < -3) == (place.joint >= 0)
 
 
 @pytest.mark.parametrize('effect', [e for e in EFFECTS.values() if e.edge], ids=_id)
@@ -109,7 +124,9 @@ def test_an_unstated_side_is_the_nearer_end_of_the_range(effect, side):
     j = next(j for j in range(tree.size) if np.isfinite(tree.upper[j]))
     joint = tree.joint_names[j]
     edge = 0.5 * (tree.upper[j] + tree.lower[j]) + side * 0.4 * (tree.upper[j] - tree.lower[j])
-    assert Place.of(effect.edge, joint, {}, {effect.edge: edge}, tree) == Place(j, side=side)
+    assert Place.of(effect.site, effect.edge, joint, {}, {effect.edge: edge}, tree) == Place(
+        j, side=side
+    )
 
 
 def test_the_spread_of_coefficients_is_that_of_the_values():

@@ -150,6 +150,14 @@ def test_the_other_joint_of_an_effect_is_named():
         assert effect_name(found) == f'a coupling between joints ({words})'
 
 
+def test_a_joint_called_base_is_not_the_base():
+    """Nor is one called `tool` the tool."""
+    pair = Equivalent((('base', 'spring'), ('base', 'gravity_tilt'), ('tool', 'unlisted')), '', 7)
+    sentence = equivalence_sentence(pair)
+    assert 'a spring on base, a base that is not level at the base and' in sentence
+    assert 'on tool would' in sentence
+
+
 @given(value=st.floats(-1e6, 1e6), std=st.floats(1e-9, 1e6))
 def test_printed_digits_keep_a_number_well_inside_its_interval(value, std):
     """Rounding moves neither the value nor the half width by more than 5.1 % of the interval."""

@@ -40,12 +40,9 @@ from sgp_ros.diagnosis.compare.volume import (
     noisy_volume,
     part_of_noise,
 )
-from sgp_ros.physics.parts import PLACES
 from sgp_ros.rigid.rigid_body import mass_matrix, torque_regressor
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.observed_motion import ObservedMotion
-
-_OTHER_PLACES = {index: name for name, index in PLACES.items()}
 
 _BLOCK = 2000
 """Rows whose regressor is held at a time: that of a long recording would not fit in memory."""
@@ -251,11 +248,6 @@ class Equations:
     @cached_property
     def _nominal_mass(self) -> np.ndarray:
         return mass_matrix(self.motion.tree, self.motion.tree.parameters, self.poses[0].position)
-
-
-def joint_name(motion: ObservedMotion, joint: int) -> str:
-    """Return the name of a joint, or of another place, as in the schema."""
-    return _OTHER_PLACES.get(joint) or motion.tree.joint_names[joint]
 
 
 def make_equations(

@@ -25,7 +25,7 @@ from sgp_ros.engine.samples import Event, JointSample
 from sgp_ros.errors import RecordingError
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 from sgp_ros.robots.robot import Robot
 

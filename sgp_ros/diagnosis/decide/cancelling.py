@@ -28,7 +28,7 @@ from sgp_ros.gp.learning import initial_model, learn, screened
 from sgp_ros.gp.model import CoefficientPrior, Observations
 from sgp_ros.gp.posterior import Posterior
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import JOINT, MOTOR
+from sgp_ros.physics.place import JOINT, MOTOR
 
 MOST_ROWS = 1000
 """Rows that Z is learned from."""

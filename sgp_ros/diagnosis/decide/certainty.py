@@ -40,7 +40,7 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.result import Difference, Finding
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import JOINT, MOTOR, Place
+from sgp_ros.physics.place import JOINT, MOTOR, Place
 
 
 @dataclass(frozen=True, eq=False)

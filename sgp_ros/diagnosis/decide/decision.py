@@ -36,7 +36,7 @@ from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.credibility import is_credible, is_sound
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.physics.parts import JOINT, MOTOR
+from sgp_ros.physics.place import JOINT, MOTOR
 
 UNKNOWN = 'unknown'
 """Name of what no effect of the list describes."""

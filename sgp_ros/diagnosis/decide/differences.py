@@ -36,7 +36,7 @@ from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import JOINT, MOTOR, Place
+from sgp_ros.physics.place import JOINT, MOTOR, Place
 
 TRIED = 3
 """Laws that are fitted on a recording, each time one is added."""

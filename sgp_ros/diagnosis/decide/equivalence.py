@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sgp_ros.diagnosis.compare.equations import Equations, joint_name
+from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import ADEQUATE_REST, ALIKE, CLEARER, LEAST_SHARE, PER_PARAMETER
 from sgp_ros.diagnosis.decide.decision import Decision
 from sgp_ros.diagnosis.decide.scale import Scale
@@ -22,6 +22,7 @@ from sgp_ros.diagnosis.explain.fitted_model import Model, imbalance
 from sgp_ros.diagnosis.result import Equivalent
 from sgp_ros.physics.drive import Drive
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.place import joint_name
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 MOST = 3

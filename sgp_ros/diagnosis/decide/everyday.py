@@ -37,7 +37,7 @@ from sgp_ros.physics.catalogue import (
 )
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.law import remembered
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from sgp_ros.physics.servo import Servo
 
 ROWS_PER_COLUMN = 4

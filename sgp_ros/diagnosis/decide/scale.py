@@ -21,7 +21,7 @@ from sgp_ros.diagnosis.criteria import (
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model, least_variance, shown_inertia
-from sgp_ros.physics.parts import JOINT, MOTOR
+from sgp_ros.physics.place import JOINT, MOTOR
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sgp_ros.diagnosis.compare.equations import Equations, joint_name
+from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.compare.power import loss
 from sgp_ros.diagnosis.compare.settled import shows as may_show
 from sgp_ros.diagnosis.criteria import (
@@ -37,7 +37,8 @@ from sgp_ros.diagnosis.result import Parameter
 from sgp_ros.physics.catalogue import COULOMB_FRICTION, EFFECTS, VISCOUS_FRICTION
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place, Quantity
+from sgp_ros.physics.parts import Quantity
+from sgp_ros.physics.place import Place, joint_name
 
 _FINEST = 1e-3
 """Least size that is tried, relative to the least start of a search."""

@@ -21,7 +21,7 @@ from sgp_ros.diagnosis.explain.fitted_model import Model, add_force, beyond_plai
 from sgp_ros.diagnosis.explain.screening import WIDEST, are_apart
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.motor_beside import has_rotor
-from sgp_ros.physics.parts import MOTOR
+from sgp_ros.physics.place import MOTOR
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 _SAME = 0.01

@@ -16,7 +16,7 @@ from sgp_ros.diagnosis.explain.regression import dry_joints
 from sgp_ros.physics.catalogue import EFFECTS, TORQUE_GAIN
 from sgp_ros.physics.effect import EMPTY, Effect
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 

@@ -27,7 +27,7 @@ from sgp_ros.diagnosis.explain.screening import distinct, screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import JOINT, MOTOR
+from sgp_ros.physics.place import JOINT, MOTOR
 
 AHEAD = 2
 """Candidates that are taken for as long as a second one beside them is looked for."""

@@ -11,7 +11,8 @@ from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.motion import SeenMotion
-from sgp_ros.physics.parts import Place, Placed, Quantity, Value
+from sgp_ros.physics.parts import Quantity, Value
+from sgp_ros.physics.place import Place, Placed
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 

@@ -33,7 +33,7 @@ from sgp_ros.diagnosis.explain.screening import distinct, may_be_two, screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt, one_of_each
-from sgp_ros.physics.parts import PLACES, Place
+from sgp_ros.physics.place import PLACES, Place
 
 SWEEPS = 4
 """Most sweeps over the joints."""

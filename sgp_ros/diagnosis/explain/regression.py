@@ -13,7 +13,7 @@ from sgp_ros.diagnosis.compare.sample import sampled
 from sgp_ros.diagnosis.explain.inertia_slope import InertiaSlope
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 MOST_HELD = 15_000_000

@@ -15,7 +15,7 @@ from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt, in_series
 from sgp_ros.physics.memory import BARE
 from sgp_ros.physics.motor_beside import has_rotor, is_bare, is_in_file
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 TRIALS = 2

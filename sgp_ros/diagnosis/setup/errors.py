@@ -32,7 +32,7 @@ _CLOCKS = (-0.3, -0.1, -0.03, -0.008, 0.008, 0.03, 0.1, 0.3)
 _DELAYS = np.geomspace(0.002, 0.12, 24)
 _TURNS = (-0.1, 0.1, 0.5 * math.pi, -0.5 * math.pi, math.pi)
 
-EFFORT_SCALE = 'effort_scale'
+EFFORT_SCALE, ORIENTATION = 'effort_scale', 'base_orientation'
 _REMEDIES = {
     'encoder_offset': 'Re-zero {joint}, or subtract {offset:.4g} from its positions.',
     'position_scale': 'Divide the positions of {joint} by {scale:.5g}: check unit and gear ratio.',
@@ -41,7 +41,7 @@ _REMEDIES = {
     EFFORT_SCALE: 'Divide the efforts of {joint} by {scale:.4g}: check unit, gear ratio and '
     'torque constant.',
     'clock_offset': 'Stamp the efforts or commands {offset:.4g} s earlier.',
-    'base_orientation': 'State how the base is mounted: roll {roll:.3g}, pitch {pitch:.3g} rad.',
+    ORIENTATION: 'State how the base is mounted: roll {roll:.3g}, pitch {pitch:.3g} rad.',
     'joint_origin': 'Move the origin of {joint} by ({x:.4g}, {y:.4g}, {z:.4g}) m.',
     'gain_scale': 'Correct the gains of {joint}: its drive has {kp:.3g} times the stated kp and '
     '{kd:.3g} times the stated kd.',
@@ -243,7 +243,7 @@ def _late_targets() -> Hypothesis:
 def _orientation() -> Hypothesis:
     starts = [(r, p) for r, p in product((0.0, *_TURNS), (0.0, *_TURNS[:-1])) if r or p]
     return Hypothesis(
-        'base_orientation', BASE, ('roll', 'pitch'), ('rad', 'rad'), np.array(starts),
+        ORIENTATION, BASE, ('roll', 'pitch'), ('rad', 'rad'), np.array(starts),
         np.full(2, 0.03), lambda c, x: replace(c, roll=float(x[0]), pitch=float(x[1])),
         canonical=_principal,
     )  # fmt: skip

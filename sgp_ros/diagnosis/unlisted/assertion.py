@@ -40,7 +40,7 @@ from sgp_ros.diagnosis.unlisted.search import search
 from sgp_ros.diagnosis.unlisted.searched import Searched
 from sgp_ros.diagnosis.unlisted.tried import leaves_less, promises
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 
 MOST_JOINTS = 3
 """Joints at which a law is looked for, those first of which most is left or explained."""

@@ -29,7 +29,7 @@ from sgp_ros.physics.catalogue import CONSTANT_LOAD, COULOMB_FRICTION, VISCOUS_F
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.law import FormulaLaw
-from sgp_ros.physics.parts import JOINT, MOTOR, Place
+from sgp_ros.physics.place import JOINT, MOTOR, Place
 
 PLAIN = (COULOMB_FRICTION, VISCOUS_FRICTION, CONSTANT_LOAD)
 _FURTHER = 3

@@ -4,8 +4,7 @@ A formula is a text of `sentences` in the variable of the smooth force, times it
 
     tau_x[elbow] = (a*tanh((q[elbow] - x0)/w0) + d)*sign(dq[elbow])
 
-All texts are compared with the curve that the data of the smooth force are (`curves`); those that
-follow it best become laws as a user could write them, with units.
+All texts are compared with the curve of its data (`curves`); the best become laws with units.
 """
 
 from __future__ import annotations
@@ -31,7 +30,8 @@ from sgp_ros.diagnosis.unlisted.variables import FORCES, MEMORY, RATIO, Variable
 from sgp_ros.physics.formula import Formula, read_formula
 from sgp_ros.physics.law import FormulaLaw
 from sgp_ros.physics.motion import SeenMotion
-from sgp_ros.physics.parts import LawParameter, Place
+from sgp_ros.physics.parts import LawParameter
+from sgp_ros.physics.place import Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 
 PER_PIECE = 0.5

@@ -25,7 +25,8 @@ from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.formula import read_formula
 from sgp_ros.physics.law import FormulaLaw
 from sgp_ros.physics.motion import SeenMotion, Structure
-from sgp_ros.physics.parts import LawParameter, Place, Placed, Quantity, Value
+from sgp_ros.physics.parts import LawParameter, Quantity, Value
+from sgp_ros.physics.place import Place, Placed
 
 SMOOTHED, SLOWEST = 'v_s', 1e-3
 """Speed of a soft sign: its name, and its least value in parts of the greatest speed."""

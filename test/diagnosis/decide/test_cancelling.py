@@ -13,7 +13,7 @@ from sgp_ros.diagnosis.decide import cancelling
 from sgp_ros.diagnosis.decide.cancelling import within_accuracy
 from sgp_ros.diagnosis.decide.decision import decide
 from sgp_ros.diagnosis.explain.comparison import Comparison
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, simulate
 

@@ -32,7 +32,7 @@ from sgp_ros.diagnosis.findings import doubted_if_late, doubted_if_none
 from sgp_ros.diagnosis.result import Finding, Location, Parameter
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from sgp_ros.physics.servo import Servo
 from test.diagnosis.fitted_models import fitted, with_coefficients
 from test.diagnosis.worlds import CHAINS, simulate

@@ -29,7 +29,7 @@ from sgp_ros.diagnosis.explain.fitted_model import floors
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from sgp_ros.rigid.rigid_body import mass_matrix
 from test.diagnosis.fitted_models import fitted, with_coefficients
 from test.diagnosis.worlds import CHAINS, events_of, robot_of, simulate

@@ -11,7 +11,7 @@ from sgp_ros.diagnosis.decide.each_alone import put_together
 from sgp_ros.diagnosis.explain.in_recording import InRecording
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 
 MOTION = SimpleNamespace(stated_number=lambda _number, _joint: 0.0)
 

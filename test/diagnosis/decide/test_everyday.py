@@ -21,7 +21,7 @@ from sgp_ros.diagnosis.findings import asserted
 from sgp_ros.diagnosis.locate.dependence import dependences
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from sgp_ros.physics.servo import Servo
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, simulate

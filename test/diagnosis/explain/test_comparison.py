@@ -14,7 +14,7 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, heavier, simulate
 

@@ -39,7 +39,7 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import are_apart, distinct, screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt, one_of_each
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from test.diagnosis.worlds import CHAINS, heavier, recorded, simulate
 from test.simulation.trees import arm
 

@@ -17,7 +17,7 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from sgp_ros.physics.servo import Servo
 from sgp_ros.rigid.rigid_body import torque_regressor
 from test.diagnosis.fitted_models import fitted

@@ -12,7 +12,7 @@ from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.diagnosis.prove.rollouts import cut, roll_out
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt, in_series
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from test.diagnosis.worlds import CHAINS, delayed, simulate
 
 

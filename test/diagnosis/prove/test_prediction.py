@@ -14,7 +14,7 @@ from sgp_ros.diagnosis.prove.prediction import FinalModel, accelerations, diagno
 from sgp_ros.diagnosis.prove.proof import prove
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from sgp_ros.rigid.pseudo_inertia import is_consistent
 from test.diagnosis.fitted_models import with_coefficients
 from test.diagnosis.worlds import CHAINS, simulate

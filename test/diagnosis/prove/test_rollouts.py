@@ -17,7 +17,7 @@ from sgp_ros.diagnosis.prove.overlay import replays
 from sgp_ros.diagnosis.prove.rollouts import cut, roll_out, work
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from test.diagnosis.fitted_models import with_coefficients
 from test.diagnosis.worlds import CHAINS, PERIOD, World, acceleration, delayed, simulate
 

@@ -22,7 +22,7 @@ from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.formula import read_formula
 from sgp_ros.physics.law import FormulaLaw
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from sgp_ros.recordings.reader import open_recording
 from sgp_ros.robots.gains import read_gains
 from sgp_ros.robots.nominal import nominal_model

@@ -18,7 +18,7 @@ from sgp_ros.diagnosis.unlisted.shapes import FINE, SmoothForce
 from sgp_ros.diagnosis.unlisted.tried import smooth_forces
 from sgp_ros.diagnosis.unlisted.variables import Variable
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, simulate
 

@@ -56,7 +56,7 @@ from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.formula import read_formula
 from sgp_ros.physics.law import FormulaLaw
-from sgp_ros.physics.parts import Place
+from sgp_ros.physics.place import Place
 from sgp_ros.physics.units import read_unit, unit_of
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, events_of, simulate
