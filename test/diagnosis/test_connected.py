@@ -11,12 +11,12 @@ import pytest
 from sgp_ros.batch.acceptance import USUAL
 from sgp_ros.diagnosis import connected
 from sgp_ros.diagnosis.connected import Connected
-from sgp_ros.diagnosis.criteria import PER_EFFECT
+from sgp_ros.diagnosis.criteria import PER_EFFECT, STATED_ERROR
 from sgp_ros.diagnosis.gathered import Knowledge, gather
 from sgp_ros.diagnosis.result import Finding, Location
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.unknowns import Agreement
-from test.diagnosis.worlds import CHAINS, events_of, simulate
+from test.diagnosis.worlds import CHAINS, events_of, heavier, simulate
 
 
 @dataclass(frozen=True)
@@ -120,6 +120,18 @@ def test_a_unit_moves_as_bodies_that_are_as_much_heavier_do(monkeypatch, noise_p
     assert worth(_Residual(left / 1e6, np.zeros(2), 0.0 * size), 0.0, 1e3) == pytest.approx(
         heavier
     )
+
+
+@pytest.mark.parametrize(('factor', 'accuracy'), [(1.03, STATED_ERROR), (1.6, 1.0)])
+def test_a_file_is_as_accurate_as_the_recording_says(robots, factor, accuracy):
+    """Beside friction: its bodies are a few per cent off, or one of them is another one."""
+    robot, tree = robots[2]
+    chain = heavier(heavier(CHAINS[2], 0, 1.02), 1, factor)
+    world = simulate(chain, 3, 20.0, force=lambda _t, _q, v: tuple(-0.3 * x for x in v))
+    known = Knowledge(robot, (), USUAL)
+    recordings = gather({'': events_of(world)}, {}, tree, known, holds_out=False)
+    of = connected.equations_of(recordings, tree)
+    assert of(recordings.learned).accuracy == accuracy
 
 
 @pytest.mark.parametrize('share', [0.5, 2.0])

@@ -107,6 +107,16 @@ def test_a_load_widens_the_last_body_alone(robots):
     np.testing.assert_array_equal(load_precision(body_directions(hollow), hollow), np.eye(20))
 
 
+def test_a_load_is_as_wide_beside_bodies_that_are_nearly_right(robots):
+    _, tree = robots[2]
+    directions = body_directions(tree)
+    np.testing.assert_allclose(body_directions(tree, accuracy=0.2), 0.2 * directions)
+    np.testing.assert_allclose(body_directions(tree, (1,), 0.2)[10:], 4.0 * directions[10:])
+    far, near = (np.linalg.inv(load_precision(directions, tree, a)) for a in (1.0, 0.2))
+    np.testing.assert_allclose(near[:10, :10], 0.04 * np.eye(10))
+    np.testing.assert_allclose(far[10:, 10:] - near[10:, 10:], 0.96 * np.eye(10), atol=1e-9)
+
+
 def test_rows_in_which_dry_friction_holds_ask_nothing(equations_for, dry):
     """There the target is zero and no effect, except inertia, may push."""
     _, equations = equations_for(dry)
