@@ -33,7 +33,7 @@ from sgp_ros.physics.place import JOINT, MOTOR, Place
 
 PLAIN = (COULOMB_FRICTION, VISCOUS_FRICTION, CONSTANT_LOAD)
 _FURTHER = 3
-"""Listed laws that are fitted beside a formula which leaves too much."""
+"""Listed laws that are tried beside a formula which leaves too much, and that may be added."""
 _NONE = 2.0
 """Standard deviations below which a coefficient is not distinguished from zero."""
 
@@ -68,8 +68,7 @@ def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
 
     They were chosen before the formula was known, and may have imitated a part of it. One after
     the other goes, and the formula and all others are fitted again, as long as that is worth more.
-    Shapes are searched again where they may have made up for what goes: those at the joint, if
-    it acts there. O(effects at the joint) such searches; all shapes of an arm would be hundreds.
+    Only shapes at the joint, if it acts there, are searched again: all of an arm are hundreds.
 
     Args:
         columns: of the recording.
@@ -95,18 +94,20 @@ def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
     return earned(columns, scale, best, joint)
 
 
-def refined(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
+def refined(
+    columns: Columns, scale: Scale, model: Model, joint: int, most: int = _FURTHER
+) -> Model:
     """Return a model with richer or further listed laws beside its formula, if worth more.
 
     Friction that creeps before it slides, or has another level each way, is that beside a formula
-    too; what plain friction leaves of it would be taken for an error of the formula. So would what
-    is left by a law of the list that the formula's force hid.
+    too; what plain friction leaves of it, or a law that its force hid, would be its error.
 
     Args:
         columns: of the recording.
         scale: of mean squares.
         model: with a formula at the joint.
         joint: index.
+        most: laws that may be added.
     """
     laws = model.frame.equations.motion.catalogue.values()
     far, near = far_and_near(model, joint)
@@ -136,14 +137,11 @@ def refined(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
     best = max(filter(is_credible, trials), key=scale.worth, default=model)
     if scale.worth(best) <= scale.worth(model):
         return model
-    return refined(columns, scale, best, joint) if is_left else best
+    return refined(columns, scale, best, joint, most - 1) if is_left and most > 1 else best
 
 
 def says_less(columns: Columns, model: Model, joint: int) -> bool:
-    """Return whether a formula has a coefficient that is not distinguished from zero.
-
-    A shorter formula would then do.
-    """
+    """Return whether a formula has a coefficient that is hardly zero: a shorter one would do."""
     law = law_of(model, joint)
     assert law is not None
     index = [s is law for s in model.effects].index(True)

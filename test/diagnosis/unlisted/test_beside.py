@@ -13,6 +13,7 @@ from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import compare_models
 from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.diagnosis.unlisted import beside
 from sgp_ros.diagnosis.unlisted.beside import acts_as_bodies, is_bent, is_creep, is_slight
 from sgp_ros.diagnosis.unlisted.shapes import FINE, SmoothForce
 from sgp_ros.diagnosis.unlisted.tried import smooth_forces
@@ -124,3 +125,25 @@ def test_a_force_that_other_bodies_would_have_is_told_from_one_that_no_body_has(
     assert not acts_as_bodies(equations, mixed, 1)
     _, alone = equations_for(simulate(CHAINS[1], 4, 10.0))
     assert not acts_as_bodies(alone, 1.3 * alone.bases[0][:, alone.instants], 0)
+
+
+def test_few_laws_are_added_beside_a_formula_however_much_each_is_worth(monkeypatch):
+    """Beside a formula that is wrong every law is worth something."""
+    motion = SimpleNamespace(catalogue={})
+
+    def model(effects):
+        frame = SimpleNamespace(equations=SimpleNamespace(motion=motion))
+        return SimpleNamespace(effects=effects, frame=frame, key=frozenset(), is_free=False,
+                               sigma=None, w=None)  # fmt: skip
+
+    at = SimpleNamespace(key=0, place=Place(0), effect=SimpleNamespace(site=None))
+    fakes = {
+        'far_and_near': lambda m, _: ((), m.effects), 'own_effects': lambda *_: (),
+        'screen': lambda *_: [at], 'distinct': lambda found, _: found, '_friction': lambda _: (),
+        'fit': lambda _, effects, *__, **___: model(effects), 'is_credible': lambda _: True,
+        'earned': lambda _columns, _scale, m, _joint: m,
+    }  # fmt: skip
+    for name, fake in fakes.items():
+        monkeypatch.setattr(beside, name, fake)
+    scale = SimpleNamespace(excess=lambda _: np.full(1, 2.0), worth=lambda m: len(m.effects))
+    assert len(beside.refined(None, scale, model(()), 0).effects) == beside._FURTHER
