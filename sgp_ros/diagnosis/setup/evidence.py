@@ -179,7 +179,7 @@ class Probe:
             if np.isfinite(shift):  # else bodies that cannot be
                 shift = 0.0 if self.full.has_all_efforts else shift + volume
             left = (rest**2).mean(axis=0) / power
-            evidence = value + rows * shift
+            evidence = value + rows * shift - kind.price
             found.append(Agreement(evidence, number, left, d / rms, rest / rms, share, rows, own))
         return max(found, key=lambda f: f.evidence)
 

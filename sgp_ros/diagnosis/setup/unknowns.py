@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
-from sgp_ros.diagnosis.criteria import INDEPENDENT_ROWS, STATED_ERROR
+from sgp_ros.diagnosis.criteria import INDEPENDENT_ROWS, PER_PARAMETER, STATED_ERROR
 from sgp_ros.physics.memory import bristle
 from sgp_ros.robots.observed_motion import ObservedMotion
 
@@ -36,6 +36,11 @@ class Set(NamedTuple):
     level: int
     accuracy: float
     builds_up: bool = True
+
+    @property
+    def price(self) -> float:
+        """Price of bodies that are further off than those of most files [nats]."""
+        return PER_PARAMETER * (self.accuracy > STATED_ERROR)
 
 
 SETS = (
