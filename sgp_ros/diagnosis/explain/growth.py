@@ -29,6 +29,9 @@ from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.place import JOINT, MOTOR
 
+_MOVED = 2
+"""Other places at which a law is tried in place of its own."""
+
 AHEAD = 2
 """Candidates that are taken for as long as a second one beside them is looked for."""
 TRIALS, MOST_TRIALS = 3, 12
@@ -202,6 +205,20 @@ def _with_two(
         return []
     ranked = sorted(filter(is_credible, trials), key=lambda t: -gain(t, model, is_whole=False))
     return [t for first in ranked[:AHEAD] for t in _counted(columns, first, block)]
+
+
+def elsewhere(columns: Columns, model: Model) -> Iterator[Model]:
+    """Yield models with a law that moves masses of its own at another joint than where it is.
+
+    An elastic joint, or play, moves all others, too: there it imitates itself.
+    """
+    laws = (s for s in model.effects if s.effect.has_memory and s.effect.uses_bodies)
+    for s in (s for s in laws if s.effect.site in {JOINT, MOTOR}):
+        arranged = arrangement(model, Block((), None), s)
+        base = refitted(columns, model, arranged)
+        found = distinct(screen(columns, base, [s.effect]))
+        others = [x for x in found if x.place.joint != s.place.joint]
+        yield from (refitted(columns, base, arranged, x) for x in others[:_MOVED])
 
 
 def two_for_one(columns: Columns, model: Model) -> Iterator[Model]:

@@ -24,6 +24,7 @@ from sgp_ros.diagnosis.explain.growth import (
     arrangement,
     best_of,
     blocks_of,
+    elsewhere,
     grown,
     refitted,
     two_for_one,
@@ -67,8 +68,8 @@ def by_joint(columns: Columns, model: Model) -> list[Model]:
             if trace(model) in columns.settled:
                 return []
             columns.settled.add(trace(model))
-            others = (*coupled(columns, model), *two_for_one(columns, model))
-            better = best_of(model, others)
+            others = (coupled, two_for_one, elsewhere)
+            better = best_of(model, (t for trials in others for t in trials(columns, model)))
             if better is None:
                 break
             model = better

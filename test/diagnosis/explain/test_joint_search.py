@@ -24,7 +24,7 @@ from sgp_ros.diagnosis.explain.candidates import fit, split
 from sgp_ros.diagnosis.explain.credibility import gain, is_credible
 from sgp_ros.diagnosis.explain.fitted_model import beyond_plain, first_scale, floors
 from sgp_ros.diagnosis.explain.frame import Frame
-from sgp_ros.diagnosis.explain.growth import Block, crossed, grown, two_for_one
+from sgp_ros.diagnosis.explain.growth import Block, crossed, elsewhere, grown, two_for_one
 from sgp_ros.diagnosis.explain.joint_search import (
     built_up,
     by_joint,
@@ -295,6 +295,21 @@ def test_friction_that_builds_up_at_every_joint_is_found_at_once(tmp_path):
     for joint, (level, way) in truth.items():
         assert found[joint].coefficients[0] == pytest.approx(level, rel=0.05)
         assert found[joint].shape[0] == pytest.approx(way, rel=0.3)
+
+
+def test_an_elastic_joint_is_looked_for_where_it_was_not_found(tmp_path):
+    """At the shoulder it fits a little, for that of the elbow moves the shoulder, too."""
+    text = 'joint_elasticity:joint=elbow,stiffness=8.0,damping=0.02,motor_inertia=0.003'
+    raw, tree = recorded(tmp_path, arm(), [f'{text},encoder=motor'], seconds=6.0)
+    columns, base = _start(make_equations(raw, tree, choose_bandwidth(raw, tree)))
+    law, motion = EFFECTS['joint_elasticity'], base.frame.equations.motion
+    place = next(p for p in law.places(motion) if p.joint == 0)
+    shoulder = EffectAt(law, place, law.starts(motion, place)[0])
+    wrong = fit(columns, (shoulder,), base.sigma, is_free=False)
+    best = growth.best_of(wrong, elsewhere(columns, wrong))
+    assert best is not None
+    assert [s.place.joint for s in best.effects] == [1]
+    assert best.mean_square.sum() < 0.1 * wrong.mean_square.sum()
 
 
 @pytest.mark.parametrize(('nominal', 'is_slight'), [(0.01, False), (0.05, True)])
