@@ -172,9 +172,7 @@ def equations_of(
 ) -> Callable[[RawTrajectory], Equations]:
     """Return what makes equations of a part of recordings, up to a cut-off [Hz]."""
     bandwidth = choose_bandwidth(recordings.learned, tree)
-    if bandwidth.cutoff > most_hz:
-        state_cutoff = bandwidth.state_cutoff * most_hz / bandwidth.cutoff
-        bandwidth = replace(bandwidth, cutoff=most_hz, state_cutoff=state_cutoff)
+    bandwidth = bandwidth.up_to(most_hz)
     require_rows(recordings.learned, bandwidth)
     accuracy = 1.0
     if not (recordings.unstated or recordings.learned.approach is not None):

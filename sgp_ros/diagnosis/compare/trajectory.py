@@ -183,6 +183,11 @@ class Bandwidth:
     cutoff: float
     state_cutoff: float
 
+    def up_to(self, most_hz: float) -> Bandwidth:
+        """Return filters of no more than a cut-off [Hz]."""
+        share = min(most_hz / self.cutoff, 1.0)
+        return Bandwidth(share * self.cutoff, share * self.state_cutoff)
+
 
 def observe(raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth) -> ObservedMotion:
     """Return the lightly smoothed motion of a trajectory; settled points as they are.

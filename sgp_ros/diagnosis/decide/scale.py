@@ -125,7 +125,7 @@ class Scale:
         """Return the fit without that prior [nats]."""
         floor = least_variance(self.floor, self.noise / self.power, model.inertia - self.carried)
         share = model.mean_square / self.power + floor
-        shown = shown_inertia(model.frame.equations, model.inertia, self.carried)
+        shown = shown_inertia(model.frame.equations, model.inertia, model.effects, self.carried)
         return self.rows * (shown - 0.5 * float(np.log(share).sum()))
 
     def worth(self, model: Model) -> float:

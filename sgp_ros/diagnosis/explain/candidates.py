@@ -158,7 +158,7 @@ def _solved(
     size = sum(len(s.shape) for s in candidates) + len(c)
     score = (
         -0.5 * N * float(np.log(variance).sum())
-        + N * shown_inertia(equations, inertia)
+        + N * shown_inertia(equations, inertia, placed)
         - 0.5 * frame.weight * float(w @ w)
         - price_of(frame, size)
     )

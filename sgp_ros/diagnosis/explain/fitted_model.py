@@ -46,7 +46,7 @@ class Model:
     @property
     def log_inertia(self) -> float:
         """Mean of log det(M / M nominal) over the rows in which joints may move."""
-        return shown_inertia(self.frame.equations, self.inertia)
+        return shown_inertia(self.frame.equations, self.inertia, self.effects)
 
     @property
     def key(self) -> frozenset[tuple[str, Place]]:
@@ -69,11 +69,7 @@ class Model:
     @property
     def delivered(self) -> np.ndarray:
         """Logs of what motors deliver of recorded efforts, (k,): of half of one, half can err."""
-        found = np.zeros(len(self.inertia))
-        for s in self.effects:
-            if s.effect is TORQUE_GAIN:
-                found[s.place.joint] += np.log(1.0 + float(s.coefficients[0]))
-        return found
+        return _delivered(self.effects, len(self.inertia))
 
     @property
     def mean_square(self) -> np.ndarray:
@@ -170,9 +166,8 @@ class Model:
     def shares(self) -> list[float]:
         """Greatest shares that the effects have of the mean squared effort of a joint.
 
-        Before any filter, as the schema has it: what lies above the cut-off counts. Not so where
-        an effect follows the measured acceleration, which is mostly noise up there. Of one that
-        couples joints only what laws of each joint alone do not say counts.
+        Before any filter, as the schema has it, unless an effect follows the acceleration, which
+        is mostly noise up there. Of one that couples joints what plain laws do not say counts.
         """
         equations = self.frame.equations
         found = []
@@ -194,14 +189,11 @@ def adds_to_usual(law: Effect) -> bool:
 
 
 def _extra_laws(s: EffectAt) -> int:
-    return len(s.effect.plain) if s.place.source >= 0 else 0
+    return len(s.effect.plain) * (s.place.source >= 0)
 
 
 def beyond_plain(s: EffectAt, force: np.ndarray, equations: Equations) -> np.ndarray:
-    """Return the rest of a force that plain laws of one joint leave, (n, k) or (n,) as given.
-
-    Rows in which dry friction holds the joint are left out: it takes up any force.
-    """
+    """Return what plain laws of one joint leave of a force, (n, k) or (n,), while it may move."""
     if not s.effect.plain:
         return force
     left, motion = force.copy(), equations.motion
@@ -222,27 +214,33 @@ def first_scale(equations: Equations) -> np.ndarray:
 
 
 def floors(equations: Equations, inertia: np.ndarray | None = None) -> np.ndarray:
-    """Return the least variance of a residual, (k,), of a model with this log of inertia (k,).
-
-    Without one, of a model with the inertia that the efforts show.
-    """
+    """Return the least variance of a residual, (k,), with this log of inertia or that shown."""
     noise = equations.effort_noise
     whole = FLOOR_SHARE * equations.power + equations.model_error
     beyond = 0.0 if inertia is None else inertia - equations.carried
     return least_variance(whole, noise, beyond) + 1e-300
 
 
+def _delivered(effects: Iterable[EffectAt], joints: int) -> np.ndarray:
+    found = np.zeros(joints)
+    for s in effects:
+        if s.effect is TORQUE_GAIN:
+            found[s.place.joint] += np.log(max(abs(1.0 + float(s.coefficients[0])), 1e-9))
+    return found
+
+
 def shown_inertia(
-    equations: Equations, inertia: np.ndarray, held: np.ndarray | float | None = None
-) -> float:
+    equations: Equations, inertia: np.ndarray, effects: Iterable[EffectAt],
+    carried: np.ndarray | float | None = None,
+) -> float:  # fmt: skip
     """Return the sum of the log of inertias (k,), each over the rows in which its joint may move.
 
     Where dry friction holds a joint, its motion is the same with any inertia, and predicted no
-    worse than by a model that lets it move: the log is `held` (k,), usually what efforts show. A
-    model without dry friction lets it move in all rows, also where an encoder shows no motion.
+    worse than by a model that lets it move: there it is what efforts show, `carried` (k,), in the
+    unit of efforts that motors deliver. Without dry friction a joint may move in all rows.
     """
     moving = equations.moving.mean(axis=0).clip(min=1e-9)
-    held = equations.carried if held is None else held
+    held = (equations.carried if carried is None else carried) + _delivered(effects, len(inertia))
     return float((inertia * moving + held * (1.0 - moving)).sum())
 
 

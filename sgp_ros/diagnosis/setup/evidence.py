@@ -53,6 +53,11 @@ _PER_PERIOD = 8.0
 """Rows per period of the cut-off before the filter."""
 _WIDE = 2.5
 """Cut-off before rows are left out, by that of the filter: motion passes, what would alias not."""
+_BAND, _MOTION = 4.0, 0.99
+"""Cut-off, by the frequency that the motion has below it: this part of its mean squares.
+
+Friction turns at once, and forces of several joints multiply.
+"""
 _KEPT = 50
 """Clock offsets of which the efforts are remembered."""
 _MOTIONS = 8
@@ -79,6 +84,9 @@ class Probe:
         self, raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth, *, knows_bodies: bool = False
     ) -> None:
         motion = observe(raw, tree, bandwidth)
+        if (most := _most_hz(motion)) < bandwidth.cutoff:
+            bandwidth = bandwidth.up_to(most)
+            motion = observe(raw, tree, bandwidth)
         every = max(1, int(1.0 / (raw.step * _PER_PERIOD * bandwidth.cutoff)))
         self._raw, self.every = raw, every
         wide = _WIDE * bandwidth.cutoff if every > 1 and not motion.is_static else math.inf
@@ -243,6 +251,19 @@ class Probe:
         """Return the share of each effort, (k,), that no model explains."""
         floor = 1e-5 + SHAPE_ERROR * nominal
         return floor + self._inaccuracy if self.full.has_all_efforts else floor
+
+
+def _most_hz(motion: ObservedMotion) -> float:
+    """Return the cut-off above which a motion says no more of its connection [Hz].
+
+    Fewer rows a second are then needed, and those that are looked at show more of the motion.
+    """
+    if motion.is_static or not motion.moves.any():
+        return math.inf
+    power = np.abs(np.fft.rfft(motion.velocity[:, motion.moves], axis=0)) ** 2
+    part = power.cumsum(axis=0) / power.sum(axis=0)
+    frequency = np.fft.rfftfreq(len(motion.time), motion.step)
+    return _BAND * float(frequency[(part < _MOTION).sum(axis=0)].max())
 
 
 def _spread(segments: Sequence[slice], every: int, margin: int) -> list[np.ndarray]:

@@ -11,7 +11,7 @@ import pytest
 from sgp_ros.diagnosis.compare import equations as compared
 from sgp_ros.diagnosis.criteria import INDEPENDENT_ROWS
 from sgp_ros.diagnosis.explain.candidates import fit, passed_on
-from sgp_ros.diagnosis.explain.fitted_model import floors
+from sgp_ros.diagnosis.explain.fitted_model import floors, shown_inertia
 from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
@@ -194,6 +194,17 @@ def test_slopes_of_motions_that_are_done_with_are_let_go(equations_for, heavy, m
     assert first.remembered == second.remembered == 0
     for one, other in zip(before, first.effort_slopes(1), strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def test_a_motor_that_delivers_half_is_as_exact_where_its_joint_is_held(equations_for, perfect):
+    """With half the inertia it leaves half of all forces, and predicts the same motion."""
+    equations = equations_for(perfect[1])[1]
+    held = np.arange(len(equations.moving))[:, None] < len(equations.moving) // 4
+    resting = replace(equations, moving=1.0 - held, carried=np.full(1, 0.3))
+    half = EffectAt(EFFECTS['torque_gain'], Place(0), coefficients=np.array([-0.5]))
+    whole = shown_inertia(resting, np.full(1, 0.2), ())
+    other = shown_inertia(resting, np.full(1, np.log(0.5) + 0.2), (half,))
+    assert whole - other == pytest.approx(np.log(2.0))
 
 
 def test_an_inertia_counts_only_where_its_joint_may_move(equations_for, perfect):
