@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import optimize
 
-from sgp_ros.diagnosis.criteria import COUNTED_SHARE, PER_EFFECT, PER_PARAMETER
+from sgp_ros.diagnosis.criteria import COUNTED_SHARE, PER_EFFECT, PER_PARAMETER, SLIGHT_REST
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.errors import Hypothesis, hypotheses
 from sgp_ros.diagnosis.setup.evidence import Probe
@@ -232,7 +232,8 @@ def _ranked(
 ) -> list[Tried]:  # fmt: skip
     """Return the hypotheses that are worth most on top of a correction, best first.
 
-    Left out are those that change less than what counts as physics, and those of sampling.
+    Left out are those that change less than what is slight, and those of sampling. One that is
+    too small for physics is still an error, and bodies would stand for it.
     """
     known = [e.hypothesis.key for e in errors]
     screened = []
@@ -251,7 +252,7 @@ def _ranked(
         drives = [s for s in screened[_REFINED:] if s[1].is_of_gains]
         return [_refined(probe, base, h, x) for _, h, x in screened[:_REFINED] + drives]
     found = [_refined(probe, base, h, x) for _, h, x in screened[:_REFINED]]
-    found = [t for t in found if t.agreement.distance(now) > COUNTED_SHARE and t.is_beyond
+    found = [t for t in found if t.agreement.distance(now) > SLIGHT_REST and t.is_beyond
              and t.agreement.leaves_less(now)]  # fmt: skip
     return sorted(found, key=lambda t: -t.worth)
 
