@@ -246,11 +246,12 @@ def _add_commands(
 ) -> None:  # fmt: skip
     """Enter targets of position or velocity, or commanded efforts, whichever the log has."""
     named = _asked(entries, joints, guess)
-    open_ones = named.pop(COMMAND)
-    if open_ones and not any(named.values()):
+    known = {x for found in (named[POSITION], named[VELOCITY], named[EFFORT]) for x in found}
+    open_ones = {x: e for x, e in named.pop(COMMAND).items() if x not in known}
+    if open_ones:
         kind, said = _meant(open_ones, positions, seconds, guess)
-        named |= {kind: open_ones} if kind else {}
-        guess.unsure.append(f'{next(iter(open_ones.values())).column} {said}.')
+        named |= {kind: named[kind] | open_ones} if kind else {}
+        guess.unsure.append(f'{", ".join(e.column for e in open_ones.values())} {said}.')
     copies = [x for x, e in named[POSITION].items()
               if np.array_equal(e.numbers, positions[x].numbers, equal_nan=True)]  # fmt: skip
     if named[POSITION] and len(copies) == len(named[POSITION]):
