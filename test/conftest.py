@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from importlib.util import find_spec
+from pathlib import Path
+from types import CodeType
 from typing import Any
 
 # As the commands do, before NumPy loads: the small matrices here are slower with more threads.
@@ -17,6 +19,31 @@ from hypothesis import settings  # noqa: E402 - the environment above comes firs
 settings.register_profile('dev', deadline=None)
 settings.register_profile('ci', deadline=None, derandomize=True)
 settings.load_profile(os.environ.get('HYPOTHESIS_PROFILE', 'dev'))
+
+
+if 'SLIPCOVER_ENABLED' in os.environ:  # by `make test MEASURE=1`
+    import numba
+
+    def _without_probes(function: Any) -> Any:
+        """Return `function` with the code of its source: Numba cannot compile probes."""
+        made = function.__code__
+        source = Path(made.co_filename).read_bytes()
+        parts = [compile(source, made.co_filename, 'exec', dont_inherit=True)]
+        for code in parts:  # grows
+            if (code.co_name, code.co_firstlineno) == (made.co_name, made.co_firstlineno):
+                function.__code__ = code
+            parts += [part for part in code.co_consts if isinstance(part, CodeType)]
+        return function
+
+    def _njit(*function: Any, _njit: Any = numba.njit, **options: Any) -> Any:
+        decorate = _njit(**options)
+        return (
+            decorate(_without_probes(*function))
+            if function
+            else lambda f: decorate(_without_probes(f))
+        )
+
+    numba.njit = _njit
 
 
 @pytest.fixture(autouse=True)
