@@ -122,12 +122,12 @@ def _layer(path):
     return parts[0]
 
 
-def _imports(tree):
-    for node in ast.walk(tree):
+def _imports(path):
+    for node in _nodes(path, ast.Import, ast.ImportFrom):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield alias.name, node
-        elif isinstance(node, ast.ImportFrom):
+        else:
             assert node.level == 0, f'relative import in line {node.lineno}'
             yield node.module, node
 
@@ -138,16 +138,35 @@ def _tree(path):
 
 
 @cache
+def _all_nodes(path):
+    """Return the nodes of a module by their type, of one walk for all tests."""
+    by_type = {}
+    for node in ast.walk(_tree(path)):
+        by_type.setdefault(type(node), []).append(node)
+    return by_type
+
+
+def _nodes(path, *types):
+    return [node for kind in types for node in _all_nodes(path).get(kind, ())]
+
+
+@pytest.fixture(scope='module', autouse=True)
+def _forgotten():
+    """Leave no trees that the garbage collector searches in all later tests."""
+    yield
+    for remembered in (_texts, _all_nodes, _tree):
+        remembered.cache_clear()
+
+
+@cache
 def _texts(path):
     """Return the strings of a module that are no docstrings."""
-    tree = _tree(path)
-    docstrings = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    docstrings = {id(node.value) for node in _nodes(path, ast.Expr)}
     return {
         node.value
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Constant) and isinstance(node.value, str)
-        and id(node) not in docstrings
-    }  # fmt: skip
+        for node in _nodes(path, ast.Constant)
+        if isinstance(node.value, str) and id(node) not in docstrings
+    }
 
 
 def test_files_of_strangers_are_read_through_one_door():
@@ -164,7 +183,7 @@ def test_imports_follow_the_table(path):
     if layer == '__init__':
         return
     permitted = LAYERS[layer]
-    for name, node in _imports(_tree(path)):
+    for name, node in _imports(path):
         parts = name.split('.')
         if parts[0] == 'sgp_ros':
             if len(parts) == 1 or parts[1] == layer:
@@ -185,7 +204,7 @@ def test_rooms_of_the_proof_follow_their_table(path):
     room = path.relative_to(PROOF).with_suffix('').parts[0]
     if room == '__init__':
         return
-    for name, node in _imports(_tree(path)):
+    for name, node in _imports(path):
         parts = name.split('.')
         if parts[0] == PROOF.name:
             assert parts[1] in {room, *PROOF_ROOMS[room]}, f'{name} in line {node.lineno}'
@@ -199,7 +218,7 @@ def test_sub_rooms_look_back_only(path):
     if not order or within == ['__init__']:
         return
     before = order[: order.index(within[0]) + 1]
-    for name, node in _imports(_tree(path)):
+    for name, node in _imports(path):
         parts = name.split('.')
         if parts[:2] == ['sgp_ros', layer]:
             assert parts[2] in before, f'{within[0]} imports {name} in line {node.lineno}'
@@ -217,16 +236,14 @@ def test_every_layer_with_folders_has_an_order():
 )
 def test_no_module_unpickles_or_evaluates(path):
     """Model and robot files are data."""
-    tree = _tree(path)
-    assert not {name.split('.')[0] for name, _ in _imports(tree)} & FORBIDDEN
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Call):
-            called = node.func
-            name = called.id if isinstance(called, ast.Name) else getattr(called, 'attr', '')
-            assert name not in {'eval', 'exec', 'unsafe_load', 'full_load'}, node.lineno
-            if name == 'load' and getattr(getattr(called, 'value', None), 'id', '') == 'np':
-                given = {k.arg: getattr(k.value, 'value', None) for k in node.keywords}
-                assert given.get('allow_pickle') is False, node.lineno
+    assert not {name.split('.')[0] for name, _ in _imports(path)} & FORBIDDEN
+    for node in _nodes(path, ast.Call):
+        called = node.func
+        name = called.id if isinstance(called, ast.Name) else getattr(called, 'attr', '')
+        assert name not in {'eval', 'exec', 'unsafe_load', 'full_load'}, node.lineno
+        if name == 'load' and getattr(getattr(called, 'value', None), 'id', '') == 'np':
+            given = {k.arg: getattr(k.value, 'value', None) for k in node.keywords}
+            assert given.get('allow_pickle') is False, node.lineno
 
 
 @pytest.mark.parametrize(
@@ -234,12 +251,12 @@ def test_no_module_unpickles_or_evaluates(path):
 )
 def test_no_module_below_the_report_logs_or_prints(path):
     """Counts and flags are returned; who calls decides how to tell them."""
-    tree = _tree(path)
-    assert not {name.split('.')[0] for name, _ in _imports(tree)} & {'logging', 'warnings'}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+    assert not {name.split('.')[0] for name, _ in _imports(path)} & {'logging', 'warnings'}
+    for node in _nodes(path, ast.Call):
+        if isinstance(node.func, ast.Name):
             assert node.func.id not in {'print', 'input'}, node.lineno
-        if isinstance(node, ast.Attribute):
+    for node in _nodes(path, ast.Attribute):
+        if node.attr in {'stdout', 'stderr'}:
             assert ast.unparse(node) not in {'sys.stdout', 'sys.stderr'}, node.lineno
 
 
@@ -248,12 +265,11 @@ def test_no_module_below_the_report_logs_or_prints(path):
 )
 def test_the_fold_is_pure(path):
     """No clock, thread, environment, file or unseeded generator below the recordings."""
-    tree = _tree(path)
-    assert not {name.split('.')[0] for name, _ in _imports(tree)} & IMPURE_MODULES
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+    assert not {name.split('.')[0] for name, _ in _imports(path)} & IMPURE_MODULES
+    for node in _nodes(path, ast.Call):
+        if isinstance(node.func, ast.Name):
             assert node.func.id != 'open', node.lineno
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+        if isinstance(node.func, ast.Attribute):
             if node.func.attr == 'default_rng':
                 assert node.args, f'generator without a seed in line {node.lineno}'
             assert not (
@@ -274,11 +290,10 @@ def test_modules_and_functions_stay_short(path):
     """Past this length a reader loses the thread; `__init__` files hold a docstring alone."""
     text = path.read_text(encoding='utf-8')
     assert text.count('\n') <= LONGEST_MODULE
-    for node in ast.walk(_tree(path)):
-        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
-            docstring = ast.get_docstring(node) or ''
-            body = node.end_lineno - node.lineno - docstring.count('\n')
-            assert body <= LONGEST_FUNCTION, node.name
+    for node in _nodes(path, ast.FunctionDef, ast.AsyncFunctionDef):
+        docstring = ast.get_docstring(node) or ''
+        body = node.end_lineno - node.lineno - docstring.count('\n')
+        assert body <= LONGEST_FUNCTION, node.name
 
 
 def _said(path):
@@ -296,12 +311,12 @@ def test_a_short_module_serves_more_than_one_other():
     names = {'.'.join(p.relative_to(PACKAGE.parent).with_suffix('').parts): p for p in paths}
     importers = {name: set() for name in names}
     for name, path in names.items():
-        for node in ast.walk(_tree(path)):
-            if isinstance(node, ast.ImportFrom) and node.module:
+        for node in _nodes(path, ast.ImportFrom):
+            if node.module:
                 whole = {node.module, *(f'{node.module}.{a.name}' for a in node.names)}
-                for imported in whole & set(names):
+                for imported in whole & names.keys():
                     importers[imported].add(name)
-        for imported in _said(path) & set(names):
+        for imported in _said(path) & names.keys():
             importers[imported].add(name)
     lonely = {
         name
@@ -335,10 +350,9 @@ def test_docstrings_begin_with_the_thing_itself(folder):
     found = [
         (path.name, node.lineno)
         for path in sorted((PACKAGE.parent / folder).rglob('*.py'))
-        for node in ast.walk(_tree(path))
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
-        and str(node.value.value).startswith('What')
-    ]  # fmt: skip
+        for node in _nodes(path, ast.Expr)
+        if isinstance(node.value, ast.Constant) and str(node.value.value).startswith('What')
+    ]
     assert not found
 
 

@@ -24,16 +24,23 @@ LAW = {
 
 
 @pytest.fixture(scope='module')
-def written(tmp_path_factory):
-    """A robot that may have the law, a recording of one that has, and what is found."""
+def stated(tmp_path_factory):
+    """A robot that may have the law, and one that has."""
     folder = tmp_path_factory.mktemp('law')
     (folder / 'arm.urdf').write_text(arm())
-    stated = yaml.safe_load(yaml.safe_dump(LAW))
-    stated['parameters']['a'] = {'value': 0.4, 'unit': 'N m s/rad'}
-    stated['parameters']['v0'] = {'value': 3.0, 'unit': 'rad/s'}
-    for name, law in (('may', LAW), ('has', stated)):
+    known = yaml.safe_load(yaml.safe_dump(LAW))
+    known['parameters']['a'] = {'value': 0.4, 'unit': 'N m s/rad'}
+    known['parameters']['v0'] = {'value': 3.0, 'unit': 'rad/s'}
+    for name, law in (('may', LAW), ('has', known)):
         robot = {'schema': 1, 'name': name, 'urdf': 'arm.urdf', 'effects': [{'law': law}]}
         (folder / f'{name}.yaml').write_text(yaml.safe_dump(robot))
+    return folder
+
+
+@pytest.fixture(scope='module')
+def written(stated):
+    """What is found by a robot that may have the law in a recording of the one that has."""
+    folder = stated
     made = ['simulate', str(folder / 'has.yaml'), '--duration', '12', '--sensor', 'bits=16']
     assert main([*made, '--out', str(folder / 'sim')]) == 0
     bag = str(folder / 'sim' / 'has.mcap')
@@ -75,9 +82,9 @@ def test_it_is_written_as_known_and_used_again(written, tmp_path):
     assert truth['effects'][0]['formula'] == f'tau_x[elbow] = {FORMULA}'
 
 
-def test_all_laws_are_listed(written, tmp_path, capsys):
+def test_all_laws_are_listed(stated, tmp_path, capsys):
     """Those of the catalogue and the robot's own, with formula and unit."""
-    robot = str(written / 'may.yaml')
+    robot = str(stated / 'may.yaml')
     assert main(['effects', '--robot', robot, '--out', str(tmp_path), '--json']) == 0
     listed = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert 'coulomb_friction' in [entry['effect'] for entry in listed['effects']]
