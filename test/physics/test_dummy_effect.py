@@ -22,6 +22,8 @@ from sgp_ros.simulation.effects import Action, Law
 from sgp_ros.simulation.registry import LAWS
 
 NAME, SEED = 'cubic_drag', 307
+SECONDS = {'real': 17.0, 'real_test': 6.0, 'real_far': 2.0}
+"""Half of what is drawn for results is enough to see it."""
 ROOT = Path(__file__).parents[2]
 
 
@@ -64,7 +66,9 @@ def diagnosed(registered, tmp_path_factory):
     folder = tmp_path_factory.mktemp('drawn')
     for name in ('cases', 'answers'):
         (folder / name).mkdir()
-    draw_case(SEED, 'A', NAME, folder)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr('sgp_proof.concealed.draw._SECONDS', SECONDS)
+        draw_case(SEED, 'A', NAME, folder)
     (case,) = (folder / 'cases').iterdir()
     answer = json.loads((folder / 'answers' / f'{case.name}.json').read_text())
     out = folder / 'out'
