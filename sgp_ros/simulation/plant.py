@@ -139,6 +139,8 @@ class Plant:
         self, inverse_mass: np.ndarray, acceleration: np.ndarray, directions: Sequence[int]
     ) -> np.ndarray:
         """Return the accelerations (k,) once the axes that stick are held."""
+        if 0 not in directions:
+            return acceleration
         stuck = [axis for axis, direction in enumerate(directions) if direction == 0]
         joints = [self._dry_joints[axis] for axis in stuck if axis < len(self._dry_joints)]
         free = np.ones(self.k)

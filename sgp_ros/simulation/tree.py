@@ -67,6 +67,7 @@ class Tree:
     _geared: np.ndarray = field(init=False, repr=False)
     _offset: np.ndarray = field(init=False, repr=False)
     _motors: np.ndarray = field(init=False, repr=False)
+    _identity: np.ndarray = field(init=False, repr=False)
     _tool: int = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -104,6 +105,7 @@ class Tree:
             '_geared': geared,
             '_offset': offset,
             '_motors': motors,
+            '_identity': np.eye(model.nv),
             '_tool': int(model.body(tree_link(text.tool_link)).id),
         }
         for name, value in built.items():
@@ -135,7 +137,7 @@ class Tree:
         data.qvel[order] = velocity
         force = self._force()
         inverse_mass = np.empty((model.nv, model.nv))
-        library.mj_solveM(model, data, inverse_mass, np.eye(model.nv))
+        library.mj_solveM(model, data, inverse_mass, self._identity)
         if isinstance(order, slice):
             return inverse_mass, force
         return inverse_mass[order[:, np.newaxis], order], force[order]
