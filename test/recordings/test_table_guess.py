@@ -528,6 +528,16 @@ def test_input_and_output_are_effort_and_position_where_nothing_else_is(tmp_path
     assert states[0].effort is None
 
 
+def test_a_target_whose_unit_says_nothing_is_one_beside_others(tmp_path):
+    """Of a rail in m beside a joint in rad: `m` may be the unit of many things."""
+    names = {'rail_position_m': Q[:, 0], 'rail_target_m': LATE[:, 0],
+             'swing_position_rad': Q[:, 1], 'swing_target_rad': LATE[:, 1]}  # fmt: skip
+    summary, _, commands = _read(_npz(tmp_path, t=T, **names), tmp_path, ())
+    assert {c.kind for c in commands} == {POSITION}
+    assert {name for c in commands for name in c.names} == {'rail', 'swing'}
+    assert any('rail_target_m stays close to the positions' in said for said in summary.unsure)
+
+
 def test_an_action_is_what_the_positions_say(tmp_path):
     """Near them it is their target; else nothing says what it is, and it is left out."""
     summary, _, commands = _read(_npz(tmp_path, t=T, q=Q, action=LATE), tmp_path)

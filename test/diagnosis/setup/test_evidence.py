@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.diagnosis.setup.correction import Correction
-from sgp_ros.diagnosis.setup.evidence import Probe
+from sgp_ros.diagnosis.setup.evidence import Probe, _most_hz
 from sgp_ros.diagnosis.setup.search import search
 from sgp_ros.physics.catalogue import ARMATURE
 from sgp_ros.physics.effect_at import EffectAt
@@ -129,3 +130,17 @@ def test_a_load_is_no_error_of_the_connection(tmp_path, k):
     loaded = replace(last, mass=2.0 * last.mass, centre=centre, inertia=inertia)
     world = simulate((*others, loaded), 1, 12.0, reach=1.5)
     assert not search(probe_of(world, *robot_of(tmp_path, CHAINS[k]))).errors
+
+
+@pytest.mark.parametrize(('hz', 'noise', 'most'), [(0.5, 1e-3, 2.0), (0.5, 10.0, 200.0)])
+def test_the_band_is_that_of_the_motion(hz, noise, most):
+    """Of slow motion fewer rows a second say as much; noise is no motion, and lowers nothing."""
+    time = 0.004 * np.arange(5000)
+    rng = np.random.default_rng(0)
+    velocity = np.cos(2.0 * np.pi * hz * time) + noise * rng.normal(size=len(time))
+    motion = SimpleNamespace(
+        is_static=False, moves=np.array([True, False]), time=time, step=0.004,
+        velocity=np.column_stack([velocity, np.zeros(len(time))]),
+    )  # fmt: skip
+    found = _most_hz(motion)
+    assert found == pytest.approx(most, rel=0.05) if noise < 1.0 else found > most
