@@ -26,7 +26,7 @@ _LATER = 1.35
 _NO_LIMIT = 20.0
 """Ranges of torque and speed up to which a motor's limits are sought."""
 
-SPREAD = 0.15
+SPREAD = 0.16
 """Prior standard deviation of the logarithm of a gain [1]: 2 is as rare as a law. Convention."""
 
 
@@ -84,7 +84,7 @@ class TorqueGain(Effect):
         return bool(at.coefficients[0] > CONNECTED - 1.0)
 
     def surprise(self, at: Placed) -> float:
-        """Return the price of a gain: most torque constants are known to 15 %."""
+        """Return the price of a gain: most torque constants are known to a sixth."""
         gain = max(1.0 + float(at.coefficients[0]), CONNECTED)
         return 0.5 * (math.log(gain) / SPREAD) ** 2
 

@@ -39,7 +39,7 @@ def stated(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def written(stated):
-    """What is found by a robot that may have the law in a recording of the one that has."""
+    """Findings of a robot that may have the law, in a recording of the one that has."""
     folder = stated
     made = ['simulate', str(folder / 'has.yaml'), '--duration', '12', '--sensor', 'bits=16']
     assert main([*made, '--out', str(folder / 'sim')]) == 0

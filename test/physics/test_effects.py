@@ -785,7 +785,7 @@ def test_bodies_without_mass_give_numbers():
 
 
 def test_numbers_that_any_recording_allows_have_a_price():
-    """A torque constant is known to a quarter, a base stands level, a warm-up is slow."""
+    """A torque constant is known to a sixth, a base stands level, a warm-up is slow."""
     gain, tilt = (EFFECTS[name] for name in ('torque_gain', 'gravity_tilt'))
     drift = EFFECTS['friction_drift']
 

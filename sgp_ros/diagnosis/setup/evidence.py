@@ -173,7 +173,7 @@ class Probe:
         units = -0.5 * self.driven * np.log(power / self.power) - np.log(np.abs(correction.scale))
         volume = float(noisy_volume(units, self._noise_part).sum())
         rows = min(INDEPENDENT_ROWS, len(both[0]))
-        found = []
+        tried: list[tuple[np.ndarray, Agreement]] = []
         usual = OF_BODIES if self._rotors is None else OF_ROTORS
         for number in usual if unknowns is None else (unknowns,):
             kind = SETS[number]
@@ -182,14 +182,27 @@ class Probe:
             floor = self._floor(own if nominal is None else nominal) * power
             precision = self._loads[kind.accuracy] if kind.level == 3 else None
             value, rest, share, w = within.explained(kind, d, power, floor, precision)
-            inertia = self._log_inertia(motion.tree, w, motion.position[self._pose])
-            shift = float(self._loop.volume(inertia, correction.kp, correction.kd).sum())
-            if np.isfinite(shift):  # else bodies that cannot be
-                shift = 0.0 if self.full.has_all_efforts else shift + volume
+            worth = value - kind.price
             left = (rest**2).mean(axis=0) / power
-            evidence = value + rows * shift - kind.price
-            found.append(Agreement(evidence, number, left, d / rms, rest / rms, share, rows, own))
-        return max(found, key=lambda f: f.evidence)
+            tried.append(
+                (w, Agreement(worth, number, left, d / rms, rest / rms, share, rows, own))
+            )
+        shift = partial(self._shift, motion, correction, volume)
+        if self.full.has_all_efforts:  # inertia does not change what is best
+            tried.sort(key=lambda t: -t[1].evidence)
+            tried = [next((t for t in tried if np.isfinite(shift(t[0]))), tried[0])]
+        counted = (replace(a, evidence=a.evidence + rows * shift(w)) for w, a in tried)
+        return max(counted, key=lambda a: a.evidence)
+
+    def _shift(
+        self, motion: ObservedMotion, correction: Correction, volume: float, w: np.ndarray
+    ) -> float:
+        """Return the evidence of the inertia of bodies w by row; -inf where none can be so."""
+        inertia = self._log_inertia(motion.tree, w, motion.position[self._pose])
+        shift = float(self._loop.volume(inertia, correction.kp, correction.kd).sum())
+        if not np.isfinite(shift):
+            return shift
+        return 0.0 if self.full.has_all_efforts else shift + volume
 
     def _delivered(self, motion: ObservedMotion, correction: Correction) -> np.ndarray:
         """Return the size of the efforts to which errors are relative, (k,) mean squares.

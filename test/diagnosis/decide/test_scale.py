@@ -24,7 +24,7 @@ def _model(inertia, mean_square, moving=1.0):
     """Return a model whose second joint is held by dry friction in part of the rows."""
     rows = np.column_stack([np.ones(10), np.arange(10) < 10 * moving])
     frame = SimpleNamespace(equations=SimpleNamespace(moving=rows))
-    return SimpleNamespace(inertia=inertia, mean_square=mean_square, frame=frame)
+    return SimpleNamespace(inertia=inertia, mean_square=mean_square, frame=frame, effects=())
 
 
 @pytest.mark.parametrize('noise', [0.0, 0.01])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -10,6 +11,7 @@ import pytest
 
 from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.trajectory import collect
+from sgp_ros.diagnosis.setup import evidence
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.evidence import Probe, _most_hz
 from sgp_ros.diagnosis.setup.search import search
@@ -68,8 +70,9 @@ def test_less_of_a_rotor_than_stated_may_be(slow):
     assert none == -np.inf
 
 
-def test_where_forces_cancel_their_accuracy_counts(slow, tmp_path):
+def test_where_forces_cancel_their_accuracy_counts(slow, tmp_path, monkeypatch):
     """Inertial forces are larger than a fast robot's effort, and nothing in a slow one's."""
+    monkeypatch.setattr(evidence, '_BAND', math.inf)
     world = simulate(CHAINS[1], 5, 12.0)
     robot, tree = robot_of(tmp_path, CHAINS[1])
     swinging, none = probe_of(world, robot, tree), Correction.none(1)
