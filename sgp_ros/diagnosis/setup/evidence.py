@@ -182,7 +182,7 @@ class Probe:
             floor = self._floor(own if nominal is None else nominal) * power
             precision = self._loads[kind.accuracy] if kind.level == 3 else None
             value, rest, share, w = within.explained(kind, d, power, floor, precision)
-            worth = value - kind.price
+            worth = value - kind.price * (self._rotors is None)
             left = (rest**2).mean(axis=0) / power
             tried.append(
                 (w, Agreement(worth, number, left, d / rms, rest / rms, share, rows, own))
@@ -269,14 +269,18 @@ class Probe:
 def _most_hz(motion: ObservedMotion) -> float:
     """Return the cut-off above which a motion says no more of its connection [Hz].
 
-    Fewer rows a second are then needed, and those that are looked at show more of the motion.
+    Fewer rows a second are then needed, and those that are looked at show more of the motion, up
+    to all of it. A steady turn has no frequency.
     """
     if motion.is_static or not motion.moves.any():
         return math.inf
     power = np.abs(np.fft.rfft(motion.velocity[:, motion.moves], axis=0)) ** 2
-    part = power.cumsum(axis=0) / power.sum(axis=0)
+    power[0] = 0.0
+    part = power.cumsum(axis=0) / np.maximum(power.sum(axis=0), 1e-300)
     frequency = np.fft.rfftfreq(len(motion.time), motion.step)
-    return _BAND * float(frequency[(part < _MOTION).sum(axis=0)].max())
+    whole = _MOST_ROWS / (_PER_PERIOD * motion.step * len(motion.time))
+    highest = frequency[np.minimum((part < _MOTION).sum(axis=0), len(frequency) - 1)].max()
+    return max(_BAND * float(highest), whole)
 
 
 def _spread(segments: Sequence[slice], every: int, margin: int) -> list[np.ndarray]:

@@ -138,7 +138,7 @@ def test_a_load_is_no_error_of_the_connection(tmp_path, k):
 @pytest.mark.parametrize(('hz', 'noise', 'most'), [(0.5, 1e-3, 2.0), (0.5, 10.0, 200.0)])
 def test_the_band_is_that_of_the_motion(hz, noise, most):
     """Of slow motion fewer rows a second say as much; noise is no motion, and lowers nothing."""
-    time = 0.004 * np.arange(5000)
+    time = 0.004 * np.arange(50_000)
     rng = np.random.default_rng(0)
     velocity = np.cos(2.0 * np.pi * hz * time) + noise * rng.normal(size=len(time))
     motion = SimpleNamespace(
@@ -147,3 +147,17 @@ def test_the_band_is_that_of_the_motion(hz, noise, most):
     )  # fmt: skip
     found = _most_hz(motion)
     assert found == pytest.approx(most, rel=0.05) if noise < 1.0 else found > most
+
+
+@pytest.mark.parametrize('noise', [0.0, 1e-3])
+def test_the_mean_of_a_steady_turn_is_no_band(noise):
+    """A slow change is looked at as a whole: no filter is slower than all rows need."""
+    time = 0.004 * np.arange(50_000)
+    velocity = (
+        3.0 + 0.01 * np.cos(0.1 * time) + noise * np.random.default_rng(0).normal(size=50_000)
+    )
+    motion = SimpleNamespace(
+        is_static=False, moves=np.array([True]), time=time, step=0.004, velocity=velocity[:, None]
+    )
+    found = _most_hz(motion)
+    assert found == pytest.approx(0.625) if noise == 0.0 else found > 0.625
