@@ -46,6 +46,8 @@ HYSTERESIS = memory.Hysteresis()
 BACKLASH = memory.Backlash()
 JOINT_COUPLING = coupled.JointCoupling()
 VELOCITY_FILTER_LAG = sensing.VelocityFilterLag()
+ENCODER_OFFSET = sensing.EncoderOffset()
+"""It may differ between recordings; for all of them it is an error of the connection, no effect."""
 
 EFFECTS: dict[str, Effect] = {
     effect.name: effect

@@ -8,7 +8,7 @@ import numpy as np
 
 from sgp_ros.physics.drawing import Drawn, JointScene
 from sgp_ros.physics.effect import Effect, Numbers
-from sgp_ros.physics.loads import wave_coefficients
+from sgp_ros.physics.loads import MECHANICS, wave_coefficients
 from sgp_ros.physics.motion import SeenMotion
 from sgp_ros.physics.parts import Quantity, SmallEffect, Value
 from sgp_ros.physics.place import Place, Placed
@@ -149,6 +149,27 @@ class EncoderEccentricity(Effect):
             lambda s: {'amplitude': s, 'periods': turns, 'phase': x.phase},
             _STEEPEST_DRAWN / slope,
         )
+
+
+class EncoderOffset(Effect):
+    """A zero of an encoder that is another one than the robot file's.
+
+    The encoder shows `q + offset`; the efforts change with the true position to first order. For
+    all of a recording it is an error of the connection; it is a law where one recording has it.
+    """
+
+    name = 'encoder_offset'
+    words = 'encoder offset'
+    formula = 'encoder shows q + offset'
+    source = MECHANICS
+    appearance = 'the residual effort is what gravity would do at another position'
+    quantities = (Quantity('offset', 'rad'),)
+    linear = ('offset',)
+    uses_bodies = True
+    sees_acceleration = True
+
+    def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
+        return motion.effort_slopes(place.joint)[0][:, :, None]
 
 
 class VelocityFilterLag(Effect):

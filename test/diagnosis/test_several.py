@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
 from sgp_ros.report.diagnosis_text import differences_text
 from sgp_ros.report.verdict import verdict_sentence
-from test.diagnosis.worlds import CHAINS, Link, events_of, simulate
+from test.diagnosis.worlds import CHAINS, QUANTUM, Link, events_of, simulate
 
 SECONDS = 6.0
 LOAD, ARM = 0.5, 0.35
@@ -19,6 +21,7 @@ LOAD, ARM = 0.5, 0.35
 FAR = 0.2, 0.7
 """One whose inertia differs more than its weight, as no torque constant does."""
 GAIN = 0.86
+ZERO = 0.06
 
 
 def _loaded(link, load=LOAD, arm=ARM):
@@ -154,6 +157,23 @@ def test_much_that_differs_at_once_is_told_apart(found):
     assert proof.rollout_after['joint0'] < 0.02 * proof.rollout_before['joint0']
     mass, z = (later['payload'][name].value for name in ('mass', 'z'))
     assert mass * z == pytest.approx(-FAR[0] * FAR[1], rel=0.03)
+
+
+@pytest.mark.long
+def test_an_encoder_that_was_zeroed_anew_differs(robots):
+    """Bodies of two recordings that shared one zero would stand for it."""
+    rng = np.random.default_rng(0)
+    events = {}
+    for stem, seed, zero in (('cold', 11, 0.0), ('warm', 12, ZERO)):
+        world = simulate(CHAINS[2], seed, SECONDS)
+        shift = np.array([0.0, zero]) + QUANTUM * rng.uniform(-0.5, 0.5)
+        events[stem] = events_of(replace(world, position=world.position + shift))
+    one = diagnose(events, *robots[2], {})
+    (found,) = one.differences
+    assert (found.recording, found.joint, found.effect) == ('warm', 'joint1', 'encoder_offset')
+    assert found.parameters['offset'].value == pytest.approx(ZERO, rel=0.05)
+    (line,) = differences_text(one)
+    assert line.startswith('warm has on joint1 encoder offset, offset 0.0')
 
 
 def test_recordings_of_different_rates_lie_on_the_grid_of_the_slower(robots):

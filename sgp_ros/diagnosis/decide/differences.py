@@ -2,11 +2,11 @@
 
 All recordings share one model. A difference is a law that acts in one recording alone, on top of
 what is common, fitted together with it. Laws that may differ are those without a shape to search,
-such as levels of friction and loads, and those that change gravity or bodies. One after the other
-is added while it is worth its price and predicts parts that were left out. A law of the common
-model that one recording alone needs is moved there; so of two recordings of which one carries a
-load, that one is named. Where either is possible, such as friction that is lower in the second
-or higher in the first, the first recording is taken as the common one.
+such as levels of friction, loads and the zero of an encoder, and those that change gravity or
+bodies. One after the other is added while it is worth its price and predicts parts that were left
+out. A law of the common model that one recording alone needs is moved there; so of two recordings
+of which one carries a load, that one is named. Where either is possible, such as friction that is
+lower in the second or higher in the first, the first recording is taken as the common one.
 
 What differs would hide what is common. So once differences are found, they are taken off, the
 common models are compared anew, and differences are looked for again beside the new one.
@@ -33,7 +33,7 @@ from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.in_recording import InRecording, may_differ, own_laws, within
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
-from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.catalogue import EFFECTS, ENCODER_OFFSET
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.place import JOINT, MOTOR, Place
@@ -221,7 +221,8 @@ class _Search:
         signed = frozenset(
             s.place.joint for s in model.effects if not isinstance(s.effect, InRecording)
         )
-        laws = [InRecording(e, recording, signed) for e in EFFECTS.values() if may_differ(e)]
+        differing = (*filter(may_differ, EFFECTS.values()), ENCODER_OFFSET)
+        laws = [InRecording(e, recording, signed) for e in differing]
         found: dict[object, EffectAt] = {}
         for _, candidate in screen(self.columns, model, laws):
             found.setdefault(candidate.key, candidate)
@@ -244,7 +245,7 @@ class _Search:
         """Return the model with a law of one recording made common to all."""
         found = []
         for i, s in enumerate(model.effects):
-            if isinstance(s.effect, InRecording):
+            if isinstance(s.effect, InRecording) and s.effect.law is not ENCODER_OFFSET:
                 common = replace(s, effect=s.effect.law)
                 if common.key not in model.key:
                     others = (*model.effects[:i], *model.effects[i + 1 :])
