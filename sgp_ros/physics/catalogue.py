@@ -47,7 +47,7 @@ BACKLASH = memory.Backlash()
 JOINT_COUPLING = coupled.JointCoupling()
 VELOCITY_FILTER_LAG = sensing.VelocityFilterLag()
 ENCODER_OFFSET = sensing.EncoderOffset()
-"""It may differ between recordings; for all of them it is an error of the connection, no effect."""
+"""It may differ between recordings; for all of them it is an error of the connection."""
 
 EFFECTS: dict[str, Effect] = {
     effect.name: effect

@@ -124,6 +124,11 @@ class Equations:
             for j, base in enumerate(self.bases)
         )
 
+    @cached_property
+    def is_never_held(self) -> np.ndarray:
+        """Whether no row may be held by dry friction of a joint, (k,)."""
+        return np.asarray(self.moving.all(axis=0))
+
     @property
     def size(self) -> int:
         """Number p of instants and of changes of the inertial parameters."""
@@ -161,10 +166,10 @@ class Equations:
         What acts on a joint that dry friction holds is taken up by it, except inertial forces:
         their smoothed share of the stop belongs to the motion before and after.
         """
-        if is_inertial:
+        own = slice(None) if columns.ndim == 3 else joint
+        if is_inertial or self.is_never_held[own].all():
             return self.filter(columns)
-        moving = self.moving if columns.ndim == 3 else self.moving[:, joint]
-        return self.filter(columns if moving.all() else columns * moving[..., None])
+        return self.filter(columns * self.moving[:, own, None])
 
     def with_dry_friction(self, joints: frozenset[int]) -> Equations:
         """Return the equations under the hypothesis that dry friction may hold these joints.
@@ -223,8 +228,7 @@ class Equations:
             acceleration=np.zeros_like(q), effort=np.zeros_like(q), drive=None, starts=(0,),
             recording=None,
         )  # fmt: skip
-        units = np.eye(q.shape[1])
-        pushed = (replace(still, acceleration=np.tile(unit, (len(q), 1))) for unit in units)
+        pushed = (replace(still, acceleration=np.tile(x, (len(q), 1))) for x in np.eye(q.shape[1]))
         return still, *pushed
 
     def inertia(self, w: np.ndarray, added: np.ndarray, passed: np.ndarray) -> np.ndarray:

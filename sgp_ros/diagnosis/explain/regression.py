@@ -155,7 +155,7 @@ class Columns:
         make: Callable[[], np.ndarray], *, is_inertial: bool = False, count: int = 1,
     ) -> Seen:  # fmt: skip
         # what acts on one joint depends on whether that one is held, on no other
-        keys = (*key, bool(equations.moving[:, max(joint, 0)].all())), (*key, equations)
+        keys = (*key, bool(equations.is_never_held[max(joint, 0)])), (*key, equations)
         for known in keys:
             if known in self._known:
                 self._known[known] = found = self._known.pop(known)  # the last one to be forgotten
@@ -195,8 +195,14 @@ class Seen:
     @cached_property
     def squares(self) -> dict[int, np.ndarray]:
         """Products of the columns of each candidate by joint, (count, m / count, m / count)."""
-        parts = {j: x.reshape(len(x), self.count, -1) for j, x in self.rows.items()}
-        return {j: np.einsum('nsa,nsb->sab', x, x) for j, x in parts.items()}
+        at, found = np.arange(self.count), {}
+        for j, x in self.rows.items():
+            if x.shape[1] == self.count:
+                found[j] = np.einsum('ns,ns->s', x, x)[:, None, None]
+            else:  # products of one candidate with another are thrown away, and yet faster
+                found[j] = (x.T @ x).reshape(self.count, -1, self.count, x.shape[1] // self.count)
+                found[j] = found[j][at, :, at]
+        return found
 
     @cached_property
     def explained(self) -> dict[int, np.ndarray]:
