@@ -16,6 +16,9 @@ from sgp_ros.diagnosis.compare.trajectory import RawTrajectory
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.observed_motion import ObservedMotion
 
+_BEYOND = 0.5
+"""Way beyond its limits that a joint may have gone, of their distance: they are stated roughly."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Acting:
@@ -96,6 +99,16 @@ class Correction:
         if self.origins is not None:
             translations[: len(self.origins)] += self.origins
         return replace(tree, gravity=base.T @ tree.gravity, translations=translations)
+
+    def keeps_limits(self, motion: ObservedMotion) -> bool:
+        """Return whether no joint was far beyond limits within which it is recorded."""
+        tree, k, recorded = motion.tree, len(self.order), motion.position
+        room = _BEYOND * (tree.upper[:k] - tree.lower[:k])
+        low, high = tree.lower[:k] - room, tree.upper[:k] + room
+        ends = np.stack([recorded.min(axis=0), recorded.max(axis=0)])
+        true = (ends[:, self.order] - self.offset) / self.scale
+        is_inside = ((ends > low) & (ends < high)).all(axis=0)
+        return bool((((true > low) & (true < high)) | ~is_inside).all())
 
     def motion(self, motion: ObservedMotion, acting: Acting) -> ObservedMotion:
         """Return an observed motion as it was.

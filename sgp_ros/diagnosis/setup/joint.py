@@ -73,7 +73,8 @@ class Together:
     def evidence(self) -> float:
         """Its evidence with the prior of the gains; none where numbers are impossible [nats]."""
         pairs = zip(self.hypotheses, self.numbers, strict=True)
-        if not all(h.is_possible(x) for h, x in pairs if len(x)):
+        is_possible = all(h.is_possible(x) for h, x in pairs if len(x))
+        if not (is_possible and self.correction.keeps_limits(self.probe.motion)):
             return -np.inf
         return self.agreement.evidence - 0.5 * float(self._off @ self._off)
 
@@ -177,9 +178,10 @@ class Together:
 
 def value_of(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> float:
     """Return the evidence of a hypothesis with its numbers x on top of a correction [nats]."""
-    if not h.is_possible(x):
+    correction = h.applied(base, x)
+    if not (h.is_possible(x) and correction.keeps_limits(probe.motion)):
         return -np.inf
-    return probe.agreement(h.applied(base, x)).evidence
+    return probe.agreement(correction).evidence
 
 
 def spread(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> np.ndarray:

@@ -247,7 +247,7 @@ def _ranked(
             x = _parabola(probe, base, h, x)
             value = max(value, value_of(probe, base, h, x))
         screened.append((value, h, x))
-    screened.sort(key=lambda s: -s[0])
+    screened = sorted((s for s in screened if s[0] > -math.inf), key=lambda s: -s[0])
     if is_beside_delay:  # with other numbers of the delay, gains are others too
         drives = [s for s in screened[_REFINED:] if s[1].is_of_gains]
         return [_refined(probe, base, h, x) for _, h, x in screened[:_REFINED] + drives]

@@ -14,7 +14,7 @@ from sgp_ros.diagnosis.result import Finding, Location, Parameter
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.errors import hypotheses
 from sgp_ros.diagnosis.setup.evidence import Probe
-from sgp_ros.diagnosis.setup.joint import Together
+from sgp_ros.diagnosis.setup.joint import Together, value_of
 from sgp_ros.diagnosis.setup.said import doubted_scales
 from sgp_ros.diagnosis.setup.search import _gain, _refined, search
 from sgp_ros.diagnosis.setup.unknowns import SUDDEN
@@ -168,6 +168,32 @@ def test_a_correction_agrees_the_same_whatever_was_looked_at_before():
     assert used.agreement(moved).evidence != used.agreement(driven).evidence
 
 
+@pytest.mark.parametrize(
+    ('low', 'high', 'scale', 'offset', 'is_kept'),
+    [(-1.0, 1.0, 1.1, 0.0, True), (-1.0, 1.0, 0.1, 0.0, False), (-1.0, 1.0, 1.0, 3.0, False),
+     (-1.0, 1.0, -1.0, 0.0, True), (-0.2, 9.0, -1.0, 0.0, True), (0.0, 0.0, 0.01, 0.0, True),
+     (-np.inf, np.inf, 0.01, 0.0, True)],
+)  # fmt: skip
+def test_no_correction_leads_a_joint_far_beyond_limits_that_it_was_seen_to_keep(
+    low, high, scale, offset, is_kept
+):
+    """It has not been there; a recording beyond them says that they, or its unit, are others."""
+    seen = np.linspace(-0.8, 0.8, 50)[:, None]
+    tree = SimpleNamespace(lower=np.array([low, 0.0]), upper=np.array([high, 0.0]))
+    wrong = Correction.none(1)
+    wrong.scale[0], wrong.offset[0] = scale, offset
+    motion = SimpleNamespace(tree=tree, position=seen)
+    assert wrong.keeps_limits(motion) is is_kept
+    hypothesis = SimpleNamespace(applied=lambda *_: wrong, is_possible=lambda _: True,
+                                 is_of_gains=False)  # fmt: skip
+    motion.tree.size = 1
+    probe = SimpleNamespace(motion=motion,
+                            agreement=lambda *_: SimpleNamespace(evidence=5.0))  # fmt: skip
+    expected = 5.0 if is_kept else -np.inf
+    assert value_of(probe, wrong, hypothesis, np.ones(1)) == expected
+    assert Together(probe, (hypothesis,), (np.ones(1),)).evidence == expected
+
+
 def test_a_corrected_motion_is_scaled_with_its_derivatives():
     raw, tree = _raw(CASES / 'case_02')
     probe = Probe(raw, tree, choose_bandwidth(raw, tree))
@@ -197,11 +223,13 @@ def test_a_corrected_motion_is_scaled_with_its_derivatives():
 def test_a_number_of_which_bodies_make_up_is_that_of_a_unit(evidence, number, is_known):
     """A torque in mN m: the evidence hardly falls over half a decade, and no number is better."""
     probe = SimpleNamespace(
-        agreement=lambda x: SimpleNamespace(evidence=float(evidence(x)), left=np.zeros(1))
+        agreement=lambda c: SimpleNamespace(evidence=float(evidence(c.x)), left=np.zeros(1)),
+        motion=None,
     )
     scale = SimpleNamespace(
         steps_at=lambda x: 0.02 * np.abs(x), is_possible=lambda x: x[0] > 0.0, exact=(1e-3, 1e3),
-        applied=lambda _base, x: x[0], canonical=lambda x: x, neutral=np.ones(1),
+        applied=lambda _base, x: SimpleNamespace(x=x[0], keeps_limits=lambda _motion: True),
+        canonical=lambda x: x, neutral=np.ones(1),
     )  # fmt: skip
     start = np.array([1000.0])
     found = _refined(probe, None, scale, start)
