@@ -124,13 +124,18 @@ def passed_on(candidates: Sequence[EffectAt], equations: Equations) -> np.ndarra
     if not isinstance(motion.drive, Servo):
         return passed
     for s in candidates:
-        change = s.characteristic
+        j, change = s.place.joint, s.characteristic
+        u = motion.effort[:, j]
+        h = _SMALL * max(float(np.sqrt((u**2).mean())), 1e-300)
         if s.effect is TORQUE_GAIN:
-            passed[s.place.joint] *= abs(1.0 + float(s.coefficients[0]))
+            passed[j] *= abs(1.0 + float(s.coefficients[0]))
         elif change is not None:
-            u = motion.effort[:, s.place.joint]
-            h = _SMALL * max(float(np.sqrt((u**2).mean())), 1e-300)
-            passed[s.place.joint] *= float(np.abs(change(u + h) - change(u - h)).mean()) / (2 * h)
+            passed[j] *= float(np.abs(change(u + h) - change(u - h)).mean()) / (2 * h)
+        elif s.effect.effort_columns(s.place.kind):
+            push = h * np.eye(len(passed))[j]
+            more, less = (s.force(replace(motion, effort=motion.effort + x))[:, j]
+                          for x in (push, -push))  # fmt: skip
+            passed[j] *= float(np.abs(1.0 + (more - less) / (2 * h)).mean())
     return passed
 
 

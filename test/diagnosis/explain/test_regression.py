@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,6 +17,8 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.formula import read_formula
+from sgp_ros.physics.law import FormulaLaw, LawParameter
 from sgp_ros.physics.place import Place
 from sgp_ros.physics.servo import Servo
 from sgp_ros.rigid.rigid_body import torque_regressor
@@ -235,3 +237,22 @@ def test_a_motor_that_passes_nothing_on_leaves_no_stiffness(has_gains):
     ]
     passed = passed_on(laws, SimpleNamespace(motion=motion))
     assert passed == pytest.approx([1.0, 0.5, 0.0, 1.0] if has_gains else [1.0] * 4, abs=1e-6)
+
+
+def test_a_formula_that_takes_the_command_away_passes_nothing_on():
+    """As a torque constant of zero does: an effort and its formula are then worth nothing."""
+
+    @dataclass(frozen=True)
+    class Seen:
+        drive: Servo
+        effort: np.ndarray
+        position: np.ndarray
+        tree: SimpleNamespace
+
+    effort = np.random.default_rng(0).normal(size=(200, 2))
+    servo = Servo(None, 0.01, (0,), np.ones(2), np.ones(2), effort, effort, effort)
+    seen = Seen(servo, effort, effort, SimpleNamespace(size=2, moving_names=('a', 'b')))
+    formula = read_formula('c*tau[b] + d*tau[a]', is_law=True)
+    numbers = [LawParameter(name, '1', start=1.0) for name in ('c', 'd')]
+    law = EffectAt(FormulaLaw(formula, 'b', numbers), Place(1), coefficients=np.array([-0.9, 3.0]))
+    assert passed_on([law], SimpleNamespace(motion=seen)) == pytest.approx([1.0, 0.1])
