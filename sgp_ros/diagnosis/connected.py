@@ -99,6 +99,12 @@ class Connected:
         return Scale.of(self.equations, self.several.comparison).nominal
 
     @property
+    def unexplained(self) -> np.ndarray:
+        """Shares of the mean squared effort that the best model leaves, beyond noise, (k,)."""
+        decision, noise = self.several.decision, self.equations.model_error / self.equations.power
+        return np.maximum((decision.tentative or decision.model).left - noise, 0.0)
+
+    @property
     def left(self) -> tuple[np.ndarray, np.ndarray]:
         """Rest of the nominal robot beyond errors of signals, and how much less bodies leave.
 

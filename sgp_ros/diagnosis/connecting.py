@@ -17,6 +17,7 @@ from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.connected import Connected, compared, foreseen
 from sgp_ros.diagnosis.criteria import (
     ALIKE,
+    COUNTED_SHARE,
     INTERVAL,
     MOST_CERTAIN,
     NEARLY,
@@ -194,17 +195,18 @@ def _is_taken_back(corrected: Connected, found: Connection) -> bool:
 
 
 def _may_be_a_law(plain: Connected, corrected: Connected) -> bool:
-    """Return whether numbers of an error may imitate a law that stays unknown.
+    """Return whether numbers of an error may imitate a law that is unknown as it was recorded.
 
-    Much of what is unknown as it was recorded is then left there.
+    Much of what is unknown is then left there, though it may look adequate with other laws.
     """
     if corrected.verdict == 'unexplained':
         return True
-    before, after = (c.several.decision.tentative or c.several.decision.model
-                     for c in (plain, corrected))  # fmt: skip
-    unknown = [j for j in corrected.several.decision.unknown
-               if j in plain.several.decision.unknown]  # fmt: skip
-    return any(after.left[j] > NEARLY * before.left[j] for j in unknown)
+    before, after = plain.unexplained, corrected.unexplained
+    still = corrected.several.decision.unknown
+    return any(
+        after[j] > NEARLY * before[j] and (j in still or after[j] > COUNTED_SHARE)
+        for j in plain.several.decision.unknown
+    )
 
 
 def _stands_for_gains(plain: Connected, found: Connection) -> bool:

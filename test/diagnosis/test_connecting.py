@@ -220,18 +220,24 @@ def test_a_scale_that_a_torque_constant_takes_back_is_none(joint, gain, is_undon
     assert connecting._is_taken_back(corrected, found) is is_undone
 
 
-@pytest.mark.parametrize(('unknown', 'left', 'may_be'), [((), 0.9, False), ((1,), 0.1, False),
-                                                          ((1,), 0.9, True)])  # fmt: skip
-def test_numbers_of_an_error_do_not_stand_for_a_law_that_stays_unknown(unknown, left, may_be):
-    """A rubber band pulls as a tilted base does, and most of it is left."""
+@pytest.mark.parametrize(
+    ('unknown', 'before', 'after', 'noise', 'may_be'),
+    [((), 1.0, 0.1, 0.0, False), ((1,), 1.0, 0.1, 0.0, False), ((1,), 1.0, 0.9, 0.0, True),
+     ((), 0.03, 0.02, 0.0, True), ((), 0.03, 0.02, 0.019, False), ((), 0.003, 0.002, 0.0, False)],
+)  # fmt: skip
+def test_numbers_of_an_error_do_not_stand_for_an_unknown_law(
+    unknown, before, after, noise, may_be
+):
+    """A rubber band pulls as a tilted base does, and most of it is left; noise always is."""
 
     def of(joints, share):
         model = SimpleNamespace(left=np.array([0.0, share]))
         decision = SimpleNamespace(
             verdict='missing_physics', unknown=joints, tentative=None, model=model
         )
-        return SimpleNamespace(
-            verdict='missing_physics', several=SimpleNamespace(decision=decision)
+        equations = SimpleNamespace(
+            model_error=np.array([0.0, 2.0 * noise]), power=np.full(2, 2.0)
         )
+        return Connected(None, equations, SimpleNamespace(decision=decision))
 
-    assert connecting._may_be_a_law(of((0, 1), 1.0), of(unknown, left)) is may_be
+    assert connecting._may_be_a_law(of((0, 1), before), of(unknown, after)) is may_be
