@@ -100,7 +100,8 @@ def _missing(found: Diagnosis) -> str:
             if len(found.findings) > 1:
                 subject = 'with corrected bodies they explain'
         text += f'; {gain_text(subject, found)}'
-    return text + '.'
+    differ = f' The recordings differ: {"; ".join(differences_text(found))}.'
+    return f'{text}.{differ if found.differences else ""}'
 
 
 def _calm(found: Diagnosis) -> str:
@@ -168,7 +169,9 @@ def _against_simulation(found: Diagnosis) -> str:
             f'(probability {f.probability:.2f})'
             for f in found.findings
         ]
-        return f'The machine differs from its simulation {"; ".join(each)}.{both}'
+        bodies = f' Bodies differ, too: {parameter_errors_text(found.parameter_errors)}.'
+        bodies = bodies if found.parameter_errors else ''
+        return f'The machine differs from its simulation {"; ".join(each)}.{bodies}{both}'
     if found.verdict == 'parameters_only':
         return (
             'The machine has the physics of its simulation, only inertial parameters differ '

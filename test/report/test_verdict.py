@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sgp_ros.diagnosis.criteria import LEAST_SHARE
-from sgp_ros.diagnosis.result import VERDICTS, Parameter
+from sgp_ros.diagnosis.result import VERDICTS, Difference, Parameter, ParameterError
 from sgp_ros.diagnosis.shown import Dependence
 from sgp_ros.report.diagnosis import render
 from sgp_ros.report.diagnosis_cards import cards
@@ -93,6 +93,25 @@ def test_a_finding_that_a_simulation_was_not_asked_for_has_no_empty_number():
     text = verdict_sentence(found)
     assert 'in the simulation level 0.100 +- 0.020 N m (' in text
     assert 'in the simulation unknown (' in text
+
+
+def test_all_that_differs_is_in_the_sentence():
+    """Between recordings beside what all lack, and bodies beside what a simulation lacks."""
+    level = COULOMB.parameters
+    change = Difference('warm', 'elbow', 'coulomb_friction', level, level, 0.99, 0.1)
+    several = replace(
+        diagnosis('missing_physics', [SPRING]), recordings=('cold', 'warm'), differences=(change,)
+    )
+    text = verdict_sentence(several)
+    assert text.startswith('Missing')
+    assert 'The recordings differ: warm has on elbow Coulomb friction' in text
+    assert 'differ' not in verdict_sentence(replace(several, differences=()))
+    known = replace(COULOMB, in_simulation={'level': Parameter(0.1, 0.01, 'N m')})
+    mass = ParameterError('forearm', 'mass', 1.2, 1.0, 0.05, 'kg')
+    found = diagnosis('missing_physics', [known])
+    text = verdict_sentence(replace(found, parameter_errors=(mass,)))
+    assert 'Bodies differ, too: mass of forearm 1.2' in text
+    assert 'Bodies' not in verdict_sentence(replace(found, parameter_errors=()))
 
 
 def test_a_low_probability_has_its_reason_beside_it():
