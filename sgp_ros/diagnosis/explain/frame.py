@@ -138,7 +138,11 @@ class Frame:
     def covariance(self) -> np.ndarray:
         """Expected square errors of w, (p, p): from the rows, and from the shrinkage by the prior.
 
-        `A^-1 (D + weight^2 I) A^-1` with the information D of the rows and `A = D + weight I`.
+        `A^-1 (D + weight^2 V) A^-1` with the information D of the rows, `A = D + weight I` and the
+        usual variances V: what made bodies of a more accurate file likely may have been what no
+        row shows of them.
         """
         inverse = np.linalg.inv(self.R.T @ self.R)
-        return np.asarray(inverse + self.weight * (self.weight - 1.0) * inverse @ inverse)
+        V = np.full(len(inverse), self.equations.accuracy**-2)
+        V[: self.equations.instants] = 1.0
+        return np.asarray(inverse + self.weight * (inverse * (self.weight * V - 1.0)) @ inverse)

@@ -60,6 +60,10 @@ def test_projection_equals_dense_ridge_regression(equations_for, heavy, k):
     inverse = np.linalg.inv(D + frame.weight * one)
     errors = inverse @ (D + frame.weight**2 * one) @ inverse
     np.testing.assert_allclose(frame.covariance, errors, rtol=1e-6, atol=1e-12)
+    # bodies may be as wrong as usual, though they were taken for more accurate
+    wrong = inverse @ (D + frame.weight**2 * 25.0 * one) @ inverse
+    trusting = replace(frame, equations=replace(equations, accuracy=0.2))
+    np.testing.assert_allclose(trusting.covariance, wrong, rtol=1e-6, atol=1e-12)
     assert frame.weight == max(1.0, N / INDEPENDENT_ROWS)
 
 
