@@ -117,6 +117,28 @@ SHORTEST_MODULE = 60
 """A module with fewer lines that one other module alone imports belongs into that one."""
 
 
+def each(paths):
+    """Make the check of one module a test of several, which names all that fail."""
+    paths = list(paths)
+
+    def failure(check, path):
+        try:
+            check(path)
+        except AssertionError as error:
+            return f'{path.relative_to(PACKAGE.parent)}: {error}'
+        return ''
+
+    def of_all(check):
+        def test():
+            failed = [text for path in paths if (text := failure(check, path))]
+            assert not failed, '\n'.join(failed)
+
+        test.__name__, test.__doc__ = check.__name__, check.__doc__
+        return test
+
+    return of_all
+
+
 def _layer(path):
     parts = path.relative_to(PACKAGE).with_suffix('').parts
     return parts[0]
@@ -176,7 +198,7 @@ def test_files_of_strangers_are_read_through_one_door():
     assert found == own
 
 
-@pytest.mark.parametrize('path', MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
+@each(MODULES)
 def test_imports_follow_the_table(path):
     """Dependencies point down; imports are absolute."""
     layer = _layer(path)
@@ -198,7 +220,7 @@ def test_imports_follow_the_table(path):
         assert known, f'{layer} imports {name} in line {node.lineno}'
 
 
-@pytest.mark.parametrize('path', PROOF_MODULES, ids=lambda p: str(p.relative_to(PROOF)))
+@each(PROOF_MODULES)
 def test_rooms_of_the_proof_follow_their_table(path):
     """The product never imports the proof, by the table of layers; its rooms do so in order."""
     room = path.relative_to(PROOF).with_suffix('').parts[0]
@@ -210,7 +232,7 @@ def test_rooms_of_the_proof_follow_their_table(path):
             assert parts[1] in {room, *PROOF_ROOMS[room]}, f'{name} in line {node.lineno}'
 
 
-@pytest.mark.parametrize('path', MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
+@each(MODULES)
 def test_sub_rooms_look_back_only(path):
     """As the stages of a diagnosis, none of which needs what comes after it."""
     layer, *within = path.relative_to(PACKAGE).with_suffix('').parts
@@ -231,9 +253,7 @@ def test_every_layer_with_folders_has_an_order():
     assert all(len(p.relative_to(PROOF).parts) <= 2 for p in PROOF_MODULES)
 
 
-@pytest.mark.parametrize(
-    'path', [*MODULES, *PROOF_MODULES], ids=lambda p: str(p.relative_to(PACKAGE.parent))
-)
+@each([*MODULES, *PROOF_MODULES])
 def test_no_module_unpickles_or_evaluates(path):
     """Model and robot files are data."""
     assert not {name.split('.')[0] for name, _ in _imports(path)} & FORBIDDEN
@@ -246,9 +266,7 @@ def test_no_module_unpickles_or_evaluates(path):
             assert given.get('allow_pickle') is False, node.lineno
 
 
-@pytest.mark.parametrize(
-    'path', [p for p in MODULES if _layer(p) in SILENT], ids=lambda p: str(p.relative_to(PACKAGE))
-)
+@each(p for p in MODULES if _layer(p) in SILENT)
 def test_no_module_below_the_report_logs_or_prints(path):
     """Counts and flags are returned; who calls decides how to tell them."""
     assert not {name.split('.')[0] for name, _ in _imports(path)} & {'logging', 'warnings'}
@@ -260,9 +278,7 @@ def test_no_module_below_the_report_logs_or_prints(path):
             assert ast.unparse(node) not in {'sys.stdout', 'sys.stderr'}, node.lineno
 
 
-@pytest.mark.parametrize(
-    'path', [p for p in MODULES if _layer(p) in PURE], ids=lambda p: str(p.relative_to(PACKAGE))
-)
+@each(p for p in MODULES if _layer(p) in PURE)
 def test_the_fold_is_pure(path):
     """No clock, thread, environment, file or unseeded generator below the recordings."""
     assert not {name.split('.')[0] for name, _ in _imports(path)} & IMPURE_MODULES
@@ -279,13 +295,13 @@ def test_the_fold_is_pure(path):
             ), node.lineno
 
 
-@pytest.mark.parametrize('path', PROOF_MODULES, ids=lambda p: str(p.relative_to(PROOF)))
+@each(PROOF_MODULES)
 def test_modules_of_the_proof_stay_short(path):
     """A script may list what it does in one function, but a module has one subject."""
     assert path.read_text(encoding='utf-8').count('\n') <= LONGEST_MODULE
 
 
-@pytest.mark.parametrize('path', MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
+@each(MODULES)
 def test_modules_and_functions_stay_short(path):
     """Past this length a reader loses the thread; `__init__` files hold a docstring alone."""
     text = path.read_text(encoding='utf-8')
@@ -326,17 +342,13 @@ def test_a_short_module_serves_more_than_one_other():
     assert not lonely - _said(PACKAGE.parent / 'setup.py')
 
 
-@pytest.mark.parametrize(
-    'path', [*MODULES, *PROOF_MODULES], ids=lambda p: str(p.relative_to(PACKAGE.parent))
-)
+@each([*MODULES, *PROOF_MODULES])
 def test_imports_are_plain(path):
     """No block for type checkers alone, in which circles hide."""
     assert 'TYPE_CHECKING' not in path.read_text(encoding='utf-8')
 
 
-@pytest.mark.parametrize(
-    'path', [*MODULES, *PROOF_MODULES], ids=lambda p: str(p.relative_to(PACKAGE.parent))
-)
+@each([*MODULES, *PROOF_MODULES])
 def test_every_module_says_what_it_is_for(path):
     """The docstring's first line is one sentence."""
     docstring = ast.get_docstring(_tree(path))
