@@ -7,14 +7,13 @@ is only approximate; so the odds of rivals are tempered: their difference in log
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import (
-    ALIKE,
     CALM_SHARE,
     COUNTED_SHARE,
     DOUBTED,
@@ -32,15 +31,13 @@ from sgp_ros.diagnosis.decide.differences import Several
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
 from sgp_ros.diagnosis.decide.everyday import with_everyday
 from sgp_ros.diagnosis.decide.scale import Scale
-from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.decide.simpler import simpler, without_one
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.result import Difference, Finding
-from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.place import JOINT, MOTOR, Place
+from sgp_ros.physics.place import JOINT, MOTOR
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +78,7 @@ def settled(
             decision = replace(decision, model=kept)
             continue
         rivals = (decision.model, *decision.rivals)
-        plainer = _plainer(equations, decision.model, chances.scale)
+        plainer = simpler(equations, decision, chances.scale)
         if plainer is not None:
             dropped |= decision.model.key - plainer.key
             why = 'a simpler model is nearly as good'
@@ -104,7 +101,7 @@ def settled(
             return decision, contrasts, chances
         weakest = effects[int(np.argmin(p))]
         dropped.add(weakest.key)
-        kept = _without(equations, decision.model, weakest)
+        kept = without_one(equations, decision.model, weakest)
         known = [m for m in rivals if _is_probable(m, chances) and not dropped & m.key]
         best = max([kept, *filter(chances.scale.counts, known)], key=chances.scale.worth)
         if not is_credible(best) or _opens(chances.scale, decision.model, best):
@@ -146,42 +143,6 @@ def _is_probable(model: Model, chances: Probabilities) -> bool:
     """Return whether a model has effects, each of which is probable enough to be asserted."""
     p = [chances.of(model, i) for i in range(len(model.effects))]
     return min(p, default=0.0) >= LEAST_ASSERTED
-
-
-def _plainer(equations: Equations, model: Model, scale: Scale) -> Model | None:
-    """Return a model without a law that few joints have and that is hardly worth more.
-
-    With its plain law in its place, where there is one, or a usual one that looks alike.
-    """
-    for s in model.effects:
-        if not (s.effect.is_usual or s.is_further_wave):
-            for plainer in (_without(equations, model, s), *_exchanged(equations, model, s)):
-                is_alike = scale.worth(plainer) > scale.worth(model) - ALIKE
-                if plainer.effects and is_credible(plainer) and is_alike:
-                    return plainer
-    return None
-
-
-def _exchanged(equations: Equations, model: Model, effect: EffectAt) -> Iterator[Model]:
-    """Yield models with a usual law in the place of an effect that looks like it."""
-    others = tuple(s for s in model.effects if s is not effect)
-    for name in effect.effect.alike:
-        other = EffectAt(EFFECTS[name], Place(effect.place.joint))
-        if other.key not in model.key:
-            yield fit(Columns(equations), (*others, other), model.sigma, is_free=model.is_free,
-                      w=model.w, still=len(others))  # fmt: skip
-
-
-def _without(equations: Equations, model: Model, effect: EffectAt) -> Model:
-    """Return a model with the plain law of an effect in its place, or else without it."""
-    fewer = without(equations, model, lambda s: s is effect)
-    place, plain = effect.place, effect.effect.plain[:1]
-    if not plain or place.source >= 0 or place.kind or (plain[0], place) in model.key:
-        return fewer
-    simple = (*fewer.effects, EffectAt(EFFECTS[plain[0]], place))
-    simpler = fit(Columns(equations), simple, model.sigma, is_free=model.is_free, w=model.w,
-                  still=len(fewer.effects))  # fmt: skip
-    return simpler if is_credible(simpler) else fewer
 
 
 def probabilities(

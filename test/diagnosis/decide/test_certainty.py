@@ -27,6 +27,7 @@ from sgp_ros.diagnosis.decide.certainty import (
 from sgp_ros.diagnosis.decide.decision import UNKNOWN, decide
 from sgp_ros.diagnosis.decide.reasons import why_not
 from sgp_ros.diagnosis.decide.scale import Scale
+from sgp_ros.diagnosis.decide.simpler import simpler
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.findings import doubted_if_late, doubted_if_none
 from sgp_ros.diagnosis.result import Finding, Location, Parameter
@@ -134,10 +135,25 @@ def test_a_rotor_takes_the_place_of_a_gain_that_is_worth_as_much(equations_for):
     _, equations = equations_for(simulate(chain, 4, 10.0))
     model = fitted(equations, 'torque_gain')
     alike, better = SimpleNamespace(worth=lambda _: 0.0), SimpleNamespace(worth=_worth_of_gains)
-    plainer = certainty._plainer(equations, model, alike)
+    decision = SimpleNamespace(model=model, rivals=())
+    plainer = simpler(equations, decision, alike)
     assert [s.effect.name for s in plainer.effects] == ['armature']
     assert plainer.effects[0].coefficients[0] == pytest.approx(0.05, rel=0.05)
-    assert certainty._plainer(equations, model, better) is None
+    assert simpler(equations, decision, better) is None
+
+
+def test_a_law_of_fewer_numbers_that_is_worth_as_much_is_named(equations_for):
+    """As the limit of a drive in place of one that falls with a speed that hardly matters."""
+    chain = CHAINS[1]
+    _, equations = equations_for(simulate(chain, 4, 10.0, force=lambda t, q, v: (0.5,)))
+    model, rival = (fitted(equations, name) for name in ('spring', 'constant_load'))
+    alike = SimpleNamespace(worth=lambda _: 0.0)
+    found = simpler(equations, SimpleNamespace(model=model, rivals=(rival,)), alike)
+    assert [s.effect.name for s in found.effects] == ['constant_load']
+    assert found.effects[0].coefficients[0] == pytest.approx(0.5, rel=0.02)
+    far = SimpleNamespace(worth=lambda m: 2.0 * ALIKE * (m is model))
+    assert simpler(equations, SimpleNamespace(model=model, rivals=(rival,)), far) is None
+    assert simpler(equations, SimpleNamespace(model=rival, rivals=(model,)), alike) is None
 
 
 def _worth_of_gains(model):

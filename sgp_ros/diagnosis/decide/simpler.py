@@ -1,0 +1,71 @@
+"""Simpler models that are hardly worth less than the one that was decided."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.criteria import ALIKE
+from sgp_ros.diagnosis.decide.cross_validation import without
+from sgp_ros.diagnosis.decide.decision import Decision
+from sgp_ros.diagnosis.decide.scale import Scale
+from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.explain.credibility import is_credible
+from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.place import Place
+
+
+def simpler(equations: Equations, decision: Decision, scale: Scale) -> Model | None:
+    """Return a model without a law that few joints have and that is hardly worth more.
+
+    With its plain law in its place, where there is one, or a usual one that looks alike, or a law
+    of fewer numbers that a rival has there.
+    """
+    model = decision.model
+    least = scale.worth(model) - ALIKE
+    for s in model.effects:
+        if s.effect.is_usual or s.is_further_wave:
+            continue
+        laws = [
+            *(EffectAt(EFFECTS[name], Place(s.place.joint)) for name in s.effect.alike),
+            *_of_fewer_numbers(s, [m for m in decision.rivals if scale.worth(m) > least]),
+        ]
+        trials = (without_one(equations, model, s), *_exchanged(equations, model, s, laws))
+        for trial in trials:
+            if trial.effects and is_credible(trial) and scale.worth(trial) > least:
+                return trial
+    return None
+
+
+def _of_fewer_numbers(effect: EffectAt, rivals: list[Model]) -> list[EffectAt]:
+    """Return the laws of fewer numbers that rivals have in the place of an effect."""
+    numbers = len(effect.effect.quantities)
+    found = {s.key: s for m in rivals for s in m.effects
+             if s.place == effect.place and len(s.effect.quantities) < numbers}  # fmt: skip
+    return list(found.values())
+
+
+def _exchanged(
+    equations: Equations, model: Model, effect: EffectAt, laws: list[EffectAt]
+) -> Iterator[Model]:
+    """Yield models with another law in the place of an effect."""
+    others = tuple(s for s in model.effects if s is not effect)
+    for law in laws:
+        if law.key not in model.key:
+            yield fit(Columns(equations), (*others, law), model.sigma, is_free=model.is_free,
+                      w=model.w, still=len(others))  # fmt: skip
+
+
+def without_one(equations: Equations, model: Model, effect: EffectAt) -> Model:
+    """Return a model with the plain law of an effect in its place, or else without it."""
+    fewer = without(equations, model, lambda s: s is effect)
+    place, plain = effect.place, effect.effect.plain[:1]
+    if not plain or place.source >= 0 or place.kind or (plain[0], place) in model.key:
+        return fewer
+    plainest = (*fewer.effects, EffectAt(EFFECTS[plain[0]], place))
+    trial = fit(Columns(equations), plainest, model.sigma, is_free=model.is_free, w=model.w,
+                still=len(fewer.effects))  # fmt: skip
+    return trial if is_credible(trial) else fewer
