@@ -123,7 +123,7 @@ def passed_on(candidates: Sequence[EffectAt], equations: Equations) -> np.ndarra
     passed = np.ones(motion.tree.size)
     if not isinstance(motion.drive, Servo):
         return passed
-    for s in candidates:
+    for s in (s for s in candidates if s.place.joint >= 0):
         j, change = s.place.joint, s.characteristic
         u = motion.effort[:, j]
         h = _SMALL * max(float(np.sqrt((u**2).mean())), 1e-300)

@@ -238,6 +238,7 @@ def test_a_motor_that_passes_nothing_on_leaves_no_stiffness(has_gains):
         half,
         _candidate('saturation', 2, [1e-9]),
         _candidate('saturation', 3, [9.0]),
+        _candidate('command_delay', -5, [0.01]),  # of all motors
     ]
     passed = passed_on(laws, SimpleNamespace(motion=motion))
     assert passed == pytest.approx([1.0, 0.5, 0.0, 1.0] if has_gains else [1.0] * 4, abs=1e-6)
