@@ -25,6 +25,7 @@ from sgp_ros.diagnosis.decide.certainty import (
 )
 from sgp_ros.diagnosis.decide.differences import Several, without_laws_of
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, equivalents
+from sgp_ros.diagnosis.decide.reasons import left_remarks
 from sgp_ros.diagnosis.decide.visibility import hides_friction, visibility
 from sgp_ros.diagnosis.disturbed import undisturbed
 from sgp_ros.diagnosis.explain.comparison import Comparison
@@ -143,7 +144,7 @@ def _diagnosed(
     recordings, whole = connected.recordings, connected.equations
     raw, tree, names = recordings.learned, whole.motion.tree, recordings.names
     parts = {'train': raw, **recordings.kept, **recordings.held}
-    several, sides, chances, final, learned, on_z, proofs = _proven(connected, parts)
+    several, sides, chances, final, learned, left, proofs = _proven(connected, parts)
     equations, model, comparison = several.equations, several.model, several.comparison
     decision, depends = several.decision, dependences(equations, comparison.base.residual)
     lags = [lag for lag in sensor_lags(raw, equations) if lag.is_physics]
@@ -158,7 +159,7 @@ def _diagnosed(
     verdict = verdict_of(decision, wrong, connected.findings, *connected.left, lags or differ)
     hidden = hides_friction(equations, comparison, decision) if verdict in _CALM else ()
     traded = traded_remarks(whole, model, wrong, recordings.unstated)
-    remarks = (*bound_remarks(decision), *on_z, *chain(*doubts.values()), *hidden, *traded)
+    remarks = (*bound_remarks(decision), *left, *chain(*doubts.values()), *hidden, *traded)
     is_doubted = bool(hidden) or rests_on(doubts, findings, tree.moving_names)
     return Diagnosis(
         robot=robot,
@@ -206,7 +207,8 @@ def _proven(connected: Connected, parts: Mapping[str, RawTrajectory]) -> _Proven
         fewer = without_laws_of(several, not_carried_over(others, connected.recordings.still))
         if fewer is several:
             on_z += _harm(final, {k: x for k, x in parts.items() if k != 'train'}, proofs)
-            return several, sides, chances, final, learned, on_z, proofs
+            left = left_remarks(several.equations, several.model, several.decision.unknown)
+            return several, sides, chances, final, learned, (*on_z, *left), proofs
         several = fewer
 
 

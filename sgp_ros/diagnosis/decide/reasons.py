@@ -1,11 +1,14 @@
-"""Reasons why a compared model is not asserted, in words that its numbers support."""
+"""Reasons why a model is not asserted, and what one leaves, in words that its numbers support."""
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterator
+
 import numpy as np
 
-from sgp_ros.diagnosis.criteria import EVIDENCE, PER_PARAMETER
-from sgp_ros.diagnosis.decide.cross_validation import support
+from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.criteria import EVIDENCE, LEAST_SHARE, PER_PARAMETER
+from sgp_ros.diagnosis.decide.cross_validation import repeatable, support
 from sgp_ros.diagnosis.decide.decision import Decision
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.credibility import is_sound
@@ -109,3 +112,20 @@ def _unsupported(model: Model, scale: Scale) -> str:
     if evidence.min() > EVIDENCE:
         return 'this recording prefers neither of the two clearly'
     return 'it does not help to predict parts of the recording that were left out'
+
+
+def left_remarks(equations: Equations, model: Model, unknown: Collection[int]) -> Iterator[str]:
+    """Yield what is left at joints that are described, where it counts as physics by itself.
+
+    It is small against what is named there, and comes back with the motion.
+    """
+    noise = equations.model_error / equations.power
+    counts = model.left - noise > LEAST_SHARE
+    counts[list(unknown)] = False
+    share = repeatable(equations, model.residual, counts)[0] * model.left
+    for j in np.flatnonzero(counts & (share > LEAST_SHARE)):
+        yield (
+            f'Of the mean squared effort of {equations.motion.tree.moving_names[j]}, '
+            f'{100.0 * share[j]:.2g} % is left that comes back with the motion. That is little '
+            'beside what is named, but it may be physics that no law here describes.'
+        )

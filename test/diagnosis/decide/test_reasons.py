@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 
@@ -12,10 +13,11 @@ from hypothesis import strategies as st
 
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE
 from sgp_ros.diagnosis.decide.decision import Decision, decide, refused
-from sgp_ros.diagnosis.decide.reasons import apart, why_not
+from sgp_ros.diagnosis.decide.reasons import apart, left_remarks, why_not
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from test.diagnosis.fitted_models import fitted
+from test.diagnosis.worlds import CHAINS, simulate
 
 NUMBERS = re.compile(r'leaves ([\d.e+-]+) % of the mean squared effort of \w+, .*?([\d.e+-]+) %')
 
@@ -156,3 +158,17 @@ def test_numbers_that_differ_are_printed_apart(a, b):
     assert (one == other) <= (abs(a - b) <= 1e-3 * max(a, b))
     if one != other:
         assert (float(one) > float(other)) == (a > b)
+
+
+@pytest.mark.parametrize(('ripple', 'unknown', 'says'), [(0.8, (), True), (0.8, (0,), False),
+                                                         (0.0, (), False)])  # fmt: skip
+def test_what_is_left_beside_laws_that_are_adequate_is_said(equations_for, ripple, unknown, says):
+    """It comes back with the motion, and counts as physics by itself."""
+    world = simulate(
+        CHAINS[1], 4, 10.0, force=lambda t, q, v: (ripple * math.sin(5.0 * q[0]) - 1.5 * v[0],)
+    )
+    _, equations = equations_for(world)
+    model = fitted(equations, 'viscous_friction')
+    found = list(left_remarks(equations, model, unknown))
+    assert len(found) == says
+    assert all('joint0' in remark and 'comes back with the motion' in remark for remark in found)
