@@ -33,9 +33,11 @@ from sgp_ros.diagnosis.criteria import (
 from sgp_ros.diagnosis.decide.cancelling import within_accuracy
 from sgp_ros.diagnosis.decide.cross_validation import repeatable, structure, supported, without
 from sgp_ros.diagnosis.decide.scale import Scale
+from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.credibility import is_credible, is_sound
 from sgp_ros.diagnosis.explain.fitted_model import Model
+from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.physics.place import JOINT, MOTOR
 
 UNKNOWN = 'unknown'
@@ -185,9 +187,7 @@ def _opened(
     base, excess = comparison.base, _passed_on(best, excess)
     open_ = np.flatnonzero(excess >= 1.0)
     worst = int(open_[np.argmax(scale.base[open_])])
-    known = without(
-        equations, best, lambda s: s.place.joint in open_ and s.effect.site in {JOINT, MOTOR}
-    )
+    known = _described(equations, best, open_)
     named = scale.found(best)
     is_open = np.isin(np.arange(len(named)), open_)
     unsaid = named[is_open if is_accurate is None else is_open & ~is_accurate].sum()
@@ -203,6 +203,19 @@ def _opened(
         return Decision('unexplained', beside, (best, *rivals), excess, worst, unknown, best,
                         base.score)  # fmt: skip
     return calm(base, rivals, scale)
+
+
+def _described(equations: Equations, best: Model, open_: np.ndarray) -> Model:
+    """Return the laws of the joints that are described, beside bodies that can be.
+
+    Those that may differ would stand for what is unknown at the other joints.
+    """
+    known = without(
+        equations, best, lambda s: s.place.joint in open_ and s.effect.site in {JOINT, MOTOR}
+    )
+    if not known.is_free or not known.effects or is_credible(known):
+        return known
+    return fit(Columns(equations), known.effects, known.sigma, is_free=False)
 
 
 def _passed_on(model: Model, excess: np.ndarray) -> np.ndarray:

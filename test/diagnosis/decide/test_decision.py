@@ -20,6 +20,7 @@ from sgp_ros.diagnosis.criteria import (
     SLIGHT_REST,
     UNNAMED_EXCESS,
 )
+from sgp_ros.diagnosis.decide import decision
 from sgp_ros.diagnosis.decide.decision import _opened, _passed_on, decide
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import added_inertia, fit
@@ -313,6 +314,18 @@ def test_the_worst_joint_is_one_that_is_not_described(half_known):
     scale = replace(Scale.of(half_known, comparison), base=np.array([0.1, 5.0]))
     found = _opened(half_known, scale, comparison, model, (), np.array([3.0, 0.0]))
     assert (found.verdict, found.worst, found.unknown) == ('unexplained', 0, (0,))
+
+
+def test_what_is_known_stands_beside_bodies_that_can_be(half_known, monkeypatch):
+    """Other bodies would imitate what is unknown at the other joint, with masses below zero."""
+    model = fitted(half_known, 'viscous_friction', is_free=True)
+    friction = EffectAt(EFFECTS['viscous_friction'], Place(1))
+    model = fit(Columns(half_known), (*model.effects, friction), model.sigma, is_free=True)
+    for can_be, is_free in ((True, True), (False, False)):
+        monkeypatch.setattr(decision, 'is_credible', lambda m, can=can_be: can or not m.is_free)
+        known = decision._described(half_known, model, np.array([0]))
+        assert [(s.name, s.place.joint) for s in known.effects] == [('viscous_friction', 1)]
+        assert known.is_free is is_free
 
 
 def test_noise_of_the_acceleration_makes_no_rotor_large(equations_for):
