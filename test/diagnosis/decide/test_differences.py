@@ -5,11 +5,12 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from sgp_ros.diagnosis.decide import differences
 from sgp_ros.diagnosis.decide.each_alone import put_together
 from sgp_ros.diagnosis.explain.in_recording import InRecording
-from sgp_ros.physics.catalogue import EFFECTS
+from sgp_ros.physics.catalogue import EFFECTS, ENCODER_OFFSET
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.place import Place
 
@@ -49,6 +50,18 @@ def test_common_laws_that_are_impossible_beside_differences_become_plain(monkeyp
     assert all(s.is_possible(MOTION) for s in found.effects if s is not later)
     right = _model(_at('asymmetric_coulomb', [13.0, 21.0]), later)
     assert search.possible(right) is right
+
+
+@pytest.mark.parametrize(('law', 'may_be_common'), [(ENCODER_OFFSET, False),
+                                                     (EFFECTS['spring'], True)])  # fmt: skip
+def test_a_wrong_zero_of_one_recording_is_never_that_of_all(monkeypatch, law, may_be_common):
+    """That would be an error of the connection, which was looked for before."""
+    monkeypatch.setattr(differences._Search, 'fitted', lambda _self, _model, effects: effects)
+    later = EffectAt(InRecording(law, 1), Place(0), coefficients=np.array([0.1]))
+    shared = differences._Search(None, None, 2)._shared(
+        SimpleNamespace(effects=(later,), key=frozenset({later.key}))
+    )
+    assert [s.effect for effects in shared for s in effects] == [law] * may_be_common
 
 
 def _alone(*laws):

@@ -11,6 +11,7 @@ from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.trajectory import collect
 from sgp_ros.diagnosis.criteria import DOUBTED
 from sgp_ros.diagnosis.result import Finding, Location, Parameter
+from sgp_ros.diagnosis.setup import search as searching
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.errors import hypotheses
 from sgp_ros.diagnosis.setup.evidence import Probe
@@ -192,6 +193,16 @@ def test_no_correction_leads_a_joint_far_beyond_limits_that_it_was_seen_to_keep(
     expected = 5.0 if is_kept else -np.inf
     assert value_of(probe, wrong, hypothesis, np.ones(1)) == expected
     assert Together(probe, (hypothesis,), (np.ones(1),)).evidence == expected
+
+
+def test_what_cannot_be_is_not_searched(monkeypatch):
+    """A hypothesis all starts of which are impossible would be refined from one of them."""
+    impossible = SimpleNamespace(key=(), starts=np.array([[0.1], [10.0]]))
+    monkeypatch.setattr(searching, 'hypotheses', lambda _motion: [impossible])
+    monkeypatch.setattr(searching, 'value_of', lambda *_: -np.inf)
+    now = SimpleNamespace(evidence=0.0)
+    probe = SimpleNamespace(full=None)
+    assert searching._ranked(probe, None, now, [], is_beside_delay=False) == []
 
 
 def test_a_corrected_motion_is_scaled_with_its_derivatives():
