@@ -56,7 +56,9 @@ def _found(raw, tree, *, knows_bodies=False):
     [
         pytest.param('case_02', ('position_scale', 'elbow', ()), [1.06], marks=pytest.mark.long),
         pytest.param('case_03', ('clock_offset', 'all', ()), [0.03], marks=pytest.mark.long),
-        ('case_04', ('base_orientation', 'base', ()), [0.0, np.pi / 2]),
+        pytest.param(
+            'case_04', ('base_orientation', 'base', ()), [0.0, np.pi / 2], marks=pytest.mark.long
+        ),
         pytest.param(
             'case_08', ('gain_scale', 'shoulder', ()), [0.8, 1.0], marks=pytest.mark.long
         ),

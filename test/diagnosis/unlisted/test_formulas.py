@@ -89,8 +89,10 @@ def _found(equations_for, links, **what):
 @pytest.mark.parametrize(
     ('force', 'links', 'formula', 'numbers'),
     [
-        (_log_friction, 1, 'a*log(1 + abs(dq[joint0])/v0)*sign(dq[joint0])',
-         {'a': -0.5, 'v0': 0.4}),
+        pytest.param(
+            _log_friction, 1, 'a*log(1 + abs(dq[joint0])/v0)*sign(dq[joint0])',
+            {'a': -0.5, 'v0': 0.4}, marks=pytest.mark.long,
+        ),
         pytest.param(
             _brake_and_friction, 1,
             'a*dq[joint0]/(1 + (dq[joint0]/v0)**2) + d*tanh(dq[joint0]/v_s)',
