@@ -17,7 +17,7 @@ from sgp_ros.diagnosis.compare.volume import noisy_volume
 from sgp_ros.diagnosis.criteria import NEARLY
 from sgp_ros.diagnosis.decide.decision import calm
 from sgp_ros.diagnosis.decide.differences import Several, decide_several, force_of
-from sgp_ros.diagnosis.decide.scale import Scale
+from sgp_ros.diagnosis.decide.scale import Scale, beyond_noise
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import first_scale
@@ -101,8 +101,8 @@ class Connected:
     @property
     def unexplained(self) -> np.ndarray:
         """Shares of the mean squared effort that the best model leaves, beyond noise, (k,)."""
-        decision, noise = self.several.decision, self.equations.model_error / self.equations.power
-        return np.maximum((decision.tentative or decision.model).left - noise, 0.0)
+        decision = self.several.decision
+        return beyond_noise(self.equations, decision.tentative or decision.model)
 
     @property
     def left(self) -> tuple[np.ndarray, np.ndarray]:

@@ -10,7 +10,7 @@ from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import EVIDENCE, LEAST_SHARE, PER_PARAMETER
 from sgp_ros.diagnosis.decide.cross_validation import repeatable, support
 from sgp_ros.diagnosis.decide.decision import Decision
-from sgp_ros.diagnosis.decide.scale import Scale
+from sgp_ros.diagnosis.decide.scale import Scale, beyond_noise
 from sgp_ros.diagnosis.explain.credibility import is_sound
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
@@ -119,8 +119,7 @@ def left_remarks(equations: Equations, model: Model, unknown: Collection[int]) -
 
     It is small against what is named there, and comes back with the motion.
     """
-    noise = equations.model_error / equations.power
-    counts = model.left - noise > LEAST_SHARE
+    counts = beyond_noise(equations, model) > LEAST_SHARE
     counts[list(unknown)] = False
     share = repeatable(equations, model.residual, counts)[0] * model.left
     for j in np.flatnonzero(counts & (share > LEAST_SHARE)):

@@ -132,3 +132,11 @@ class Scale:
         """Return the fit of a model, less the price of its freedom [nats]."""
         price = model.law_price + PER_PARAMETER * model.freedom
         return self.fit(model) - price - model.surprise
+
+
+def beyond_noise(equations: Equations, model: Model) -> np.ndarray:
+    """Return the shares of the mean squared effort that a model leaves, less those of noise, (k,).
+
+    Noise is what a perfect model leaves.
+    """
+    return np.maximum(model.left - equations.model_error / equations.power, 0.0)

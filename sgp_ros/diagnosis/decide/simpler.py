@@ -26,12 +26,13 @@ def simpler(equations: Equations, decision: Decision, scale: Scale) -> Model | N
     """
     model = decision.model
     least = scale.worth(model) - ALIKE
+    near = [m for m in decision.rivals if scale.worth(m) > least]
     for s in model.effects:
         if s.effect.is_usual or s.is_further_wave:
             continue
         laws = [
             *(EffectAt(EFFECTS[name], Place(s.place.joint)) for name in s.effect.alike),
-            *_of_fewer_numbers(s, [m for m in decision.rivals if scale.worth(m) > least]),
+            *_of_fewer_numbers(s, near),
         ]
         trials = (without_one(equations, model, s), *_exchanged(equations, model, s, laws))
         for trial in trials:
