@@ -28,7 +28,9 @@ from sgp_ros.diagnosis.decide.decision import UNKNOWN, decide
 from sgp_ros.diagnosis.decide.reasons import why_not
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.decide.simpler import simpler
+from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
+from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.findings import doubted_if_late, doubted_if_none
 from sgp_ros.diagnosis.result import Finding, Location, Parameter
 from sgp_ros.physics.catalogue import EFFECTS
@@ -143,14 +145,20 @@ def test_a_rotor_takes_the_place_of_a_gain_that_is_worth_as_much(equations_for):
 
 
 def test_a_law_of_fewer_numbers_that_is_worth_as_much_is_named(equations_for):
-    """As the limit of a drive in place of one that falls with a speed that hardly matters."""
-    chain = CHAINS[1]
-    _, equations = equations_for(simulate(chain, 4, 10.0, force=lambda t, q, v: (0.5,)))
-    model, rival = (fitted(equations, name) for name in ('spring', 'constant_load'))
+    """The limit of a drive, in place of one that falls with a speed that hardly matters."""
+    limit = 4.0
+    world = simulate(CHAINS[1], 4, 10.0, motor=lambda u, _now: [min(max(u[-1][0], -limit), limit)])
+    _, equations = equations_for(world)
+    none = fitted(equations)
+    model, rival = (
+        fit(Columns(equations), (EffectAt(EFFECTS[name], Place(0), np.array(shape)),), none.sigma)
+        for name, shape in (('motor_speed_limit', [4.0, 400.0]), ('saturation', [3.5]))
+    )  # fmt: skip
     alike = SimpleNamespace(worth=lambda _: 0.0)
     found = simpler(equations, SimpleNamespace(model=model, rivals=(rival,)), alike)
-    assert [s.effect.name for s in found.effects] == ['constant_load']
-    assert found.effects[0].coefficients[0] == pytest.approx(0.5, rel=0.02)
+    assert [s.effect.name for s in found.effects] == ['saturation']
+    assert found.effects[0].shape == pytest.approx(rival.effects[0].shape, rel=0.02)
+    assert simpler(equations, SimpleNamespace(model=model, rivals=()), alike) is None
     far = SimpleNamespace(worth=lambda m: 2.0 * ALIKE * (m is model))
     assert simpler(equations, SimpleNamespace(model=model, rivals=(rival,)), far) is None
     assert simpler(equations, SimpleNamespace(model=rival, rivals=(model,)), alike) is None
