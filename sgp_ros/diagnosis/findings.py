@@ -227,7 +227,7 @@ def bound_remarks(decision: Decision) -> tuple[str, ...]:
                 f'{", ".join(names)} of {where}: at the limit of what this recording can '
                 'determine, so no interval is given; the true value may lie beyond.'
             )
-    drive = motion.drive
+    drive = motion.drive.targets if isinstance(motion.drive, Servo) else motion.drive
     if isinstance(drive, Drive) and any(s.effect.is_late for s in decision.model.effects):
         period = 1e3 * float(np.median(np.diff(drive.times)))
         remarks.append(
