@@ -17,7 +17,7 @@ from sgp_ros.diagnosis.compare.volume import noisy_volume
 from sgp_ros.diagnosis.criteria import NEARLY
 from sgp_ros.diagnosis.decide.decision import calm
 from sgp_ros.diagnosis.decide.differences import Several, decide_several, force_of
-from sgp_ros.diagnosis.decide.scale import Scale, beyond_noise
+from sgp_ros.diagnosis.decide.scale import Scale, beyond_noise, moving_power
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import first_scale
@@ -112,9 +112,8 @@ class Connected:
         weight that is held makes the mean square large and tells nothing of the motion.
         """
         nominal, bodies = self.several.comparison.nominal, self.several.comparison.parameters
-        gained, power = nominal.left - bodies.left, self.equations.power
-        variance = np.minimum(self.equations.motion.effort.var(axis=0), power)
-        moving = gained * power / np.where(variance > 0.0, variance, power)
+        gained = nominal.left - bodies.left
+        moving = gained * self.equations.power / moving_power(self.equations)
         return np.maximum(nominal.left, moving), gained
 
     def worth(

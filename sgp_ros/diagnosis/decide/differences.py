@@ -26,7 +26,7 @@ from sgp_ros.diagnosis.decide.cross_validation import support
 from sgp_ros.diagnosis.decide.decision import Decision, decide, refused
 from sgp_ros.diagnosis.decide.each_alone import models_of_each, put_together
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
-from sgp_ros.diagnosis.decide.scale import Scale
+from sgp_ros.diagnosis.decide.scale import Scale, moving_power
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison, compare_models
 from sgp_ros.diagnosis.explain.fitted_model import Model
@@ -165,9 +165,11 @@ class _Search:
                       *self._fewer(model)]  # fmt: skip
             for r in range(self.count):
                 trials += self._added(model, r)
-            trials = [m for m in trials if m.is_possible() and np.isfinite(m.score)]
-            best = max(trials, key=self.worth, default=model)
-            if self.worth(best) <= self.worth(model) + ALIKE or not self._holds(best):
+            least = self.worth(model) + ALIKE
+            possible = (m for m in trials if m.is_possible() and np.isfinite(m.score))
+            better = [m for m in possible if self.worth(m) > least]
+            better.sort(key=self.worth, reverse=True)
+            if (best := next(filter(self._holds, better), None)) is None:
                 return model
             model = best
 
@@ -280,7 +282,7 @@ class _Search:
     def _holds(self, model: Model) -> bool:
         """Return whether the last effect counts as physics and predicts what was left out.
 
-        Only effects that act in one recording are tested.
+        Only effects that act in one recording are tested, beside what moves the robot.
         """
         equations, last = model.frame.equations, model.effects[-1]
         if not isinstance(last.effect, InRecording):
@@ -288,12 +290,10 @@ class _Search:
         recording = equations.motion.recording
         assert recording is not None
         there = recording[equations.filter.rows] == last.effect.recording
-        share = (model.forces[-1][there] ** 2).mean(axis=0) / equations.power
+        share = (model.forces[-1][there] ** 2).mean(axis=0) / moving_power(equations)
         floor = self.scale.floor * self.scale.power
-        evidence = support(self.columns, model, floor, self.scale.rows)[-1]
-        return (
-            bool(share.max() > COUNTED_SHARE) and evidence > EVIDENCE and math.isfinite(evidence)
-        )
+        evidence = float(support(self.columns, model, floor, self.scale.rows)[-1])
+        return EVIDENCE < evidence < math.inf and float(share.max()) > COUNTED_SHARE
 
 
 def _same(law: Effect) -> Effect:

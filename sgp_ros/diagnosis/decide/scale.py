@@ -134,6 +134,15 @@ class Scale:
         return self.fit(model) - price - model.surprise
 
 
+def moving_power(equations: Equations) -> np.ndarray:
+    """Return the mean squares of the efforts, (k,), without that of a weight that is held.
+
+    It makes them large and tells nothing of the motion: this is at most the variance.
+    """
+    variance = np.minimum(equations.motion.effort.var(axis=0), equations.power)
+    return np.where(variance > 0.0, variance, equations.power)
+
+
 def beyond_noise(equations: Equations, model: Model) -> np.ndarray:
     """Return the shares of the mean squared effort that a model leaves, less those of noise, (k,).
 

@@ -66,9 +66,9 @@ def far_and_near(model: Model, joint: int) -> tuple[tuple[EffectAt, ...], tuple[
 def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
     """Return a model without the listed effects that are not worth their price beside its formula.
 
-    They were chosen before the formula was known, and may have imitated a part of it. One after
-    the other goes, and the formula and all others are fitted again, as long as that is worth more.
-    Only shapes at the joint, if it acts there, are searched again: all of an arm are hundreds.
+    They were chosen without the formula, and may have imitated a part of it. One after the other
+    goes, a load for other bodies, and all that is left is fitted again, as long as that is worth
+    more. Only shapes at the joint, if it acts there, are searched again: an arm has hundreds.
 
     Args:
         columns: of the recording.
@@ -85,7 +85,7 @@ def earned(columns: Columns, scale: Scale, model: Model, joint: int) -> Model:
             trials += [
                 fit(columns, (*far, *near), model.sigma, is_free=is_free, rounds=2, steps=10,
                     still=still)
-                for is_free in dict.fromkeys((False, model.is_free))
+                for is_free in dict.fromkeys((False, model.is_free, out.effect.is_body))
             ]  # fmt: skip
     possible = [t for t in trials if t.is_possible() and np.isfinite(t.score)]
     best = max(possible, key=scale.worth, default=model)
@@ -268,8 +268,8 @@ def _is_plain_sum(s: EffectAt) -> bool:
 def beside(listed: Model, joint: int, *, is_open: bool) -> Iterable[tuple[EffectAt, ...]]:
     """Return sets of listed effects of a joint that a law may stand beside.
 
-    None, all, all but one, and all but those of one variable; where they leave the joint
-    unexplained, also those of plain friction: the list was asked without the law, and friction
+    None, all, all but one, and all but those of one variable; where they leave it unexplained, or
+    one is rare, also those of plain friction: the list was asked without the law, and friction
     beside it may have been left out, or given another name.
 
     Args:
@@ -277,8 +277,10 @@ def beside(listed: Model, joint: int, *, is_open: bool) -> Iterable[tuple[Effect
         joint: index.
         is_open: whether it leaves the joint unexplained.
     """
-    found = _subsets(own_effects(listed, joint))
-    found += _subsets(_friction(joint)) if is_open else []
+    own = own_effects(listed, joint)
+    found = _subsets(own)
+    if is_open or not all(s.effect.is_usual for s in own):
+        found += _subsets(_friction(joint))
     unique: dict[object, tuple[EffectAt, ...]] = {}
     for kept in found:
         unique.setdefault(frozenset(s.key for s in kept), kept)
@@ -286,7 +288,7 @@ def beside(listed: Model, joint: int, *, is_open: bool) -> Iterable[tuple[Effect
 
 
 def _friction(joint: int) -> tuple[EffectAt, ...]:
-    return tuple(EffectAt(e, Place(joint)) for e in (COULOMB_FRICTION, VISCOUS_FRICTION))
+    return tuple(EffectAt(e, Place(joint)) for e in PLAIN[:2])
 
 
 def _subsets(effects: tuple[EffectAt, ...]) -> list[tuple[EffectAt, ...]]:

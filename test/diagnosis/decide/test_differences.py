@@ -90,3 +90,42 @@ def test_models_of_each_recording_are_put_together():
     found = put_together({0: first, 1: same})
     assert [s.effect.name for s in found] == [dry, oil, f'{oil} in 1']
     assert put_together({}) == ()
+
+
+@pytest.mark.parametrize(('weight', 'force', 'evidence', 'holds'), [
+    (0.0, 0.3, 99.0, True), (50.0, 0.3, 99.0, True), (0.0, 0.01, 99.0, False),
+    (50.0, 0.01, 99.0, False), (0.0, 0.3, 1.0, False),
+])  # fmt: skip
+def test_a_difference_counts_beside_what_moves_the_robot(
+    monkeypatch, weight, force, evidence, holds
+):
+    """A weight that is held makes the mean square of the effort large and says nothing."""
+    rows = np.arange(400)
+    effort = weight + np.sin(0.1 * rows)[:, None]
+    equations = SimpleNamespace(
+        power=(effort**2).mean(axis=0), filter=SimpleNamespace(rows=rows),
+        motion=SimpleNamespace(effort=effort, recording=rows // 200),
+    )  # fmt: skip
+    monkeypatch.setattr(differences, 'support', lambda *_: np.array([evidence]))
+    later = EffectAt(InRecording(EFFECTS['coulomb_friction'], 1), Place(0))
+    model = SimpleNamespace(
+        frame=SimpleNamespace(equations=equations), effects=(later,),
+        forces=(np.where(rows < 200, 0.0, force)[:, None],),
+    )  # fmt: skip
+    scale = SimpleNamespace(floor=1e-5, power=1.0, rows=100.0)
+    assert differences._Search(None, scale, 2)._holds(model) is holds
+
+
+def test_a_difference_that_does_not_count_hides_no_other(monkeypatch):
+    search = differences._Search(None, None, 2)
+    models = {name: SimpleNamespace(is_possible=lambda: True, score=0.0, size=size, name=name)
+              for name, size in (('none', 0.0), ('slight', 9.0), ('clear', 5.0))}  # fmt: skip
+    more = {'none': ['slight', 'clear']}
+    fakes = {
+        '_added': lambda _, m, _recording: [models[n] for n in more.get(m.name, [])],
+        'worth': lambda _, m: m.size, '_holds': lambda _, m: m.name == 'clear',
+        **dict.fromkeys(('_moved', '_shared', '_simpler', '_fewer'), lambda *_: []),
+    }  # fmt: skip
+    for name, fake in fakes.items():
+        monkeypatch.setattr(differences._Search, name, fake)
+    assert search.extended(models['none']) is models['clear']

@@ -18,8 +18,9 @@ from sgp_ros.diagnosis.unlisted.beside import acts_as_bodies, is_bent, is_creep,
 from sgp_ros.diagnosis.unlisted.shapes import FINE, SmoothForce
 from sgp_ros.diagnosis.unlisted.tried import smooth_forces
 from sgp_ros.diagnosis.unlisted.variables import Variable
+from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.place import Place
+from sgp_ros.physics.place import JOINT, Place
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, simulate
 
@@ -147,3 +148,39 @@ def test_few_laws_are_added_beside_a_formula_however_much_each_is_worth(monkeypa
         monkeypatch.setattr(beside, name, fake)
     scale = SimpleNamespace(excess=lambda _: np.full(1, 2.0), worth=lambda m: len(m.effects))
     assert len(beside.refined(None, scale, model(()), 0).effects) == beside._FURTHER
+
+
+@pytest.mark.parametrize(
+    ('names', 'is_open', 'is_tried'),
+    [
+        (('viscous_friction',), False, False),
+        (('viscous_friction',), True, True),
+        (('viscous_friction', 'position_friction'), False, True),
+    ],
+)
+def test_plain_friction_is_tried_in_place_of_a_rare_law(names, is_open, is_tried):
+    """Such as friction in a part of the range, which imitated a part of the law looked for."""
+    listed = SimpleNamespace(effects=tuple(EffectAt(EFFECTS[n], Place(0)) for n in names))
+    kept = [{s.name for s in some} for some in beside.beside(listed, 0, is_open=is_open)]
+    assert set(names) in kept
+    assert ({'coulomb_friction', 'viscous_friction'} in kept) is is_tried
+
+
+@pytest.mark.parametrize('rare', ['payload', 'position_friction'])
+def test_other_bodies_take_the_place_of_a_load_beside_a_formula(monkeypatch, rare):
+    """With it, bodies as in the file were enough while nothing else was known."""
+    law = EffectAt(SimpleNamespace(site=JOINT), Place(0))
+    other = EffectAt(EFFECTS[rare], Place(0))
+
+    def fit(_columns, effects, _sigma, *, is_free, **_):
+        worth = 3.0 if is_free and other not in effects else 1.0
+        return SimpleNamespace(effects=effects, is_free=is_free, sigma=None, worth=worth,
+                               score=0.0, is_possible=lambda: True)  # fmt: skip
+
+    monkeypatch.setattr(beside, 'fit', fit)
+    monkeypatch.setattr(beside, 'law_of', lambda *_: law)
+    scale = SimpleNamespace(worth=lambda m: m.worth)
+    start = SimpleNamespace(effects=(law, other), is_free=False, sigma=None, worth=2.0)
+    found = beside.earned(None, scale, start, 0)
+    assert found.is_free is (rare == 'payload')
+    assert (found is start) is (rare != 'payload')
