@@ -95,7 +95,7 @@ SUB_ROOMS = {
     'diagnosis': (
         'criteria', 'shown', 'result', 'compare', 'setup', 'explain', 'locate', 'decide',
         'unlisted', 'findings', 'wrong_bodies', 'prove', 'mapping', 'gathered', 'connected',
-        'connecting', 'disturbed', 'common_structure', 'reference', 'pipeline',
+        'refining', 'connecting', 'disturbed', 'common_structure', 'reference', 'pipeline',
     ),
     'robots': (
         'entries', 'shipped', 'listing', 'gains', 'models', 'observed_motion', 'nominal_prior',

@@ -25,6 +25,7 @@ from sgp_ros.diagnosis.criteria import (
     TEMPER,
 )
 from sgp_ros.diagnosis.gathered import Recordings
+from sgp_ros.diagnosis.refining import refined
 from sgp_ros.diagnosis.result import Equivalent
 from sgp_ros.diagnosis.setup.errors import EFFORT_SCALE
 from sgp_ros.diagnosis.setup.evidence import Probe
@@ -121,7 +122,8 @@ def _connected(
         each: progress of one comparison after the other.
         corrected: what was compared with these errors undone, where that is known.
     """
-    if not found.errors or (corrected is None and _is_hopeless(plain, found, tree)):
+    found = found if corrected is not None else _promising(plain, found, tree)
+    if not found.errors:
         return plain
     corrected = corrected or _undone(plain, found, tree, each)
     if _is_taken_back(corrected, found):
@@ -141,6 +143,7 @@ def _connected(
     if gain < (-ALIKE if _stands_for_gains(plain, found) else PER_EFFECT):
         is_alike = gain + rare >= -ALIKE
         return _beside(plain, found.errors, gain, _named(corrected)) if is_alike else plain
+    found, corrected = _refined(plain, found, corrected, tree, each)
     errors = tuple(error_finding(found, i, gain) for i in range(len(found.errors)))
     least = min(range(len(errors)), key=lambda i: errors[i].probability)
     if len(errors) > 1 and errors[least].probability < MOST_CERTAIN:
@@ -167,17 +170,31 @@ def _undone(
     return replace(compared(recordings, whole, next(each)), correction=correction)
 
 
-def _is_hopeless(plain: Connected, found: Connection, tree: Tree) -> bool:
-    """Return whether errors are worth much too little with the laws found without them, or fewer.
+def _promising(plain: Connected, found: Connection, tree: Tree) -> Connection:
+    """Return errors, with better numbers, that are worth something with the laws found without.
 
     Where these explain the recordings as they are, a comparison of all models on corrected ones
-    finds hardly more than with such laws, and takes as long as everything before.
+    finds hardly more than with such laws, or fewer, and takes as long as everything before. None
+    are left that are worth much too little so.
     """
-    if plain.verdict == 'unexplained':
-        return False
-    correction, (price, rare) = found.errors[-1].correction, price_of(found)
-    corrected = foreseen(plain, correction, tree)
-    return _gain(plain, corrected, price) + rare < -2.0 * ALIKE
+    if not found.errors or plain.verdict == 'unexplained':
+        return found
+    corrected, (price, rare) = foreseen(plain, found.errors[-1].correction, tree), price_of(found)
+    if _gain(plain, corrected, price) + rare < -2.0 * ALIKE:
+        return replace(found, errors=(), rivals=())
+    return refined(found, plain, corrected, tree)[0]
+
+
+def _refined(
+    plain: Connected, found: Connection, corrected: Connected, tree: Tree,
+    each: Iterator[Callable[[float], None]],
+) -> tuple[Connection, Connected]:  # fmt: skip
+    """Return errors with better numbers, and what is compared with these undone."""
+    again, has_moved = refined(found, plain, corrected, tree)
+    if not has_moved:
+        return again, corrected
+    better = _undone(plain, again, tree, each)
+    return (again, better) if _gain(corrected, better, 0.0) > 0.0 else (found, corrected)
 
 
 def _is_taken_back(corrected: Connected, found: Connection) -> bool:

@@ -35,7 +35,7 @@ def _found(monkeypatch, compare, numbers):
         'compared': compare, '_gain': lambda *_: 100.0, 'foreseen': lambda *_: None,
         'error_finding': lambda *_: SimpleNamespace(probability=0.99),
         'equal_errors': lambda _: (), '_stands_for_gains': lambda *_: False,
-        'setup_advice': lambda _: 'advice',
+        'setup_advice': lambda _: 'advice', 'refined': lambda found, *_: (found, False),
     }.items():  # fmt: skip
         monkeypatch.setattr(connecting, name, stub)
     hypothesis = SimpleNamespace(effect='', names=numbers, is_of_gains=False)
@@ -43,7 +43,7 @@ def _found(monkeypatch, compare, numbers):
     error = SimpleNamespace(
         correction=correction, numbers=numbers, remedy='', hypothesis=hypothesis
     )
-    return SimpleNamespace(errors=(error,), delay_std=0.0)
+    return Connection((error,), ((),), None, None)
 
 
 @pytest.mark.parametrize('verdict', ['missing_physics', 'unexplained'])
@@ -185,7 +185,8 @@ def test_an_error_that_is_not_certain_must_be_worth_it_beside_physics(
     monkeypatch.setattr(Correction, 'tree', lambda _self, tree: tree)
     for name, stub in {
         'compared': lambda *_: _of(10.0), '_gain': gain, '_named': lambda _: frozenset(),
-        '_is_hopeless': lambda *_: False,
+        '_promising': lambda _plain, found, _tree: found,
+        'refined': lambda found, *_: (found, False),
         'price_of': lambda found: (10.0, 10.0 * (len(found.errors) - 1)),
         'equal_errors': lambda _: (), '_stands_for_gains': lambda *_: False,
         'error_finding': lambda found, i, _gain: SimpleNamespace(

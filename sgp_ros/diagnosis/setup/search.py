@@ -86,9 +86,7 @@ class Connection:
     def without(self, i: int) -> Connection:
         """Return the errors but one, with their numbers as they are."""
         rivals = self.rivals[:i] + self.rivals[i + 1 :]
-        return replace(
-            self, errors=_undoing(self.errors[:i] + self.errors[i + 1 :]), rivals=rivals
-        )
+        return replace(self, errors=undoing(self.errors[:i] + self.errors[i + 1 :]), rivals=rivals)
 
 
 def search(probe: Probe) -> Connection:
@@ -111,7 +109,7 @@ def search(probe: Probe) -> Connection:
         chains.append(_grown(probe, [], start, rivals))
     best = max(chains, key=lambda c: _worth(c, start))
     # physics beside them stays to be found
-    errors = _undoing([e for e in best if not e.hypothesis.is_physics])
+    errors = undoing([e for e in best if not e.hypothesis.is_physics])
     late = max((float(e.std[0]) for e in best if e.hypothesis.is_physics), default=0.0)
     end = best[-1].agreement if best else start
     others = tuple(rivals[e.hypothesis.key] for e in errors)
@@ -169,7 +167,7 @@ def _gain(probe: Probe, tried: Tried, base: Correction, now: Agreement) -> float
     return min(gains)
 
 
-def _undoing(errors: Sequence[Tried]) -> tuple[Tried, ...]:
+def undoing(errors: Sequence[Tried]) -> tuple[Tried, ...]:
     """Return errors that are undone one after the other, with their numbers as they are."""
     kept: list[Tried] = []
     for e in errors:
