@@ -269,18 +269,18 @@ def beside(listed: Model, joint: int, *, is_open: bool) -> Iterable[tuple[Effect
     """Return sets of listed effects of a joint that a law may stand beside.
 
     None, all, all but one, and all but those of one variable; where they leave it unexplained, or
-    one is rare, also those of plain friction: the list was asked without the law, and friction
-    beside it may have been left out, or given another name.
+    one is rare, also those of plain friction, beside a rotor if there is one: the list was asked
+    without the law, and friction beside it may have been left out, or given another name.
 
     Args:
         listed: model of listed effects.
         joint: index.
         is_open: whether it leaves the joint unexplained.
     """
-    own = own_effects(listed, joint)
-    found = _subsets(own)
+    found = _subsets(own := own_effects(listed, joint))
     if is_open or not all(s.effect.is_usual for s in own):
-        found += _subsets(_friction(joint))
+        rotor = tuple(s for s in own if s.effect.is_usual and s.effect.is_inertial)
+        found += [(*kept, *rotor) for kept in _subsets(_friction(joint))]
     unique: dict[object, tuple[EffectAt, ...]] = {}
     for kept in found:
         unique.setdefault(frozenset(s.key for s in kept), kept)

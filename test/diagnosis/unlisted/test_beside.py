@@ -156,14 +156,18 @@ def test_few_laws_are_added_beside_a_formula_however_much_each_is_worth(monkeypa
         (('viscous_friction',), False, False),
         (('viscous_friction',), True, True),
         (('viscous_friction', 'position_friction'), False, True),
+        (('armature', 'viscous_friction'), True, True),
+        (('armature', 'position_friction'), False, True),
     ],
 )
 def test_plain_friction_is_tried_in_place_of_a_rare_law(names, is_open, is_tried):
     """Such as friction in a part of the range, which imitated a part of the law looked for."""
     listed = SimpleNamespace(effects=tuple(EffectAt(EFFECTS[n], Place(0)) for n in names))
     kept = [{s.name for s in some} for some in beside.beside(listed, 0, is_open=is_open)]
+    rotor = {'armature'} & set(names)
     assert set(names) in kept
-    assert ({'coulomb_friction', 'viscous_friction'} in kept) is is_tried
+    assert ({'coulomb_friction', *rotor} in kept) is is_tried
+    assert ({'coulomb_friction', 'viscous_friction', *rotor} in kept) is is_tried
 
 
 @pytest.mark.parametrize('rare', ['payload', 'position_friction'])
