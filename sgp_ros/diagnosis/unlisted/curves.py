@@ -12,16 +12,19 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache, cached_property
 from types import MappingProxyType
 
 import numpy as np
 
 from sgp_ros.diagnosis.unlisted.sentences import COEFFICIENTS
-from sgp_ros.physics.formula import Formula
+from sgp_ros.physics.formula import Formula, read_formula
 
 _STARTS, _WAVES, _KEPT, _STEPS = 5, 13, 8, 9
 """Starts between the ends of each parameter's range, and of a wave number, of which one that is a
 third off says nothing; those that are improved, and their steps."""
+_USEFUL, _VAIN = 0.999, 2
+"""Part of what is left that a step leaves, and steps in vain that end a search."""
 _RIDGE, _MOVE, _LONGEST, _GREATEST, _BLOCK = 1e-10, 1e-4, 0.25, 1e100, 16
 
 Columns = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -114,6 +117,12 @@ class Followed:
     left: float
 
 
+@cache
+def in_position(text: str) -> Formula:
+    """Return a text in X as a formula of a position; the same hundreds are tried at each joint."""
+    return read_formula(text.replace('X', 'q[X]'), is_law=True)
+
+
 def follow(
     formula: Formula, curve: Curve, ranges: Mapping[str, tuple[float, float]],
     near: Mapping[str, float] = MappingProxyType({}),
@@ -136,12 +145,12 @@ def follow(
     known = axes.high <= axes.low
     u = _starts(free, axes, near)
     _, cost = left(u)
-    u = u[np.argsort(cost)[: min(_KEPT, int(np.isfinite(cost).sum()))]]
-    if not len(u):
+    kept = np.argsort(cost)[: min(_KEPT, int(np.isfinite(cost).sum()))]
+    if not len(kept):
         return None
+    u, cost = u[kept], cost[kept]
     if len(free) > known.sum():
-        u = _improved(u, left, ~known)
-    _, cost = left(u)
+        u, cost = _improved(u, left, ~known)
     best = int(np.argmin(cost))
     return Followed(dict(zip(free, axes.at(u)[best].tolist(), strict=True)), float(cost[best]))
 
@@ -167,7 +176,7 @@ class _Axes:
         log = np.log(np.where(is_ratio, x, 1.0) / safe) / np.maximum(np.log(ratio), 1e-300)
         return np.where(is_ratio, log, even)
 
-    @property
+    @cached_property
     def _ratios(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         is_ratio = self.low > 0.0
         safe = np.where(is_ratio, self.low, 1.0)
@@ -226,23 +235,26 @@ def _left(values: np.ndarray, curve: Curve) -> tuple[np.ndarray, np.ndarray]:
     norm = np.sqrt((X * X).sum(axis=1))
     X /= np.where(norm > 0.0, norm, 1.0)[:, None, :]
     G = X.transpose(0, 2, 1) @ X + _RIDGE * np.eye(X.shape[2])
-    c = np.linalg.solve(G, (X.transpose(0, 2, 1) @ curve.y)[:, :, None])
+    g = (X.transpose(0, 2, 1) @ curve.y)[:, :, None]
+    c = g / G if G.shape[1] == 1 else np.linalg.solve(G, g)
     r = curve.y - (X @ c)[:, :, 0]
     return r, np.where(bad, np.inf, (r * r).sum(axis=1))
 
 
 def _improved(u: np.ndarray, left: Callable[..., tuple[np.ndarray, np.ndarray]],
-              free: np.ndarray) -> np.ndarray:  # fmt: skip
-    """Return places u (s, m) in the unit box after Levenberg-Marquardt steps, each its own."""
+              free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Return places u (s, m) in the unit box after Levenberg-Marquardt steps, each its own.
+
+    With the sums of squares there, (s,). They end where two steps improve none by a thousandth.
+    """
     damping, index = np.full(len(u), 1e-2), np.flatnonzero(free)
-    r, cost = left(u)
+    (s, m), (r, cost), vain = (len(u), len(index)), left(u), 0
     for _ in range(_STEPS):
-        J = np.empty((*r.shape, len(index)))
-        for i, j in enumerate(index):
-            h = np.where(u[:, j] + _MOVE <= 1.0, _MOVE, -_MOVE)
-            moved = u.copy()
-            moved[:, j] += h
-            J[:, :, i] = (left(moved)[0] - r) / h[:, None]
+        h = np.where(u[:, index] + _MOVE <= 1.0, _MOVE, -_MOVE)
+        moved = np.repeat(u[None], m, axis=0)
+        moved[np.arange(m), :, index] += h.T
+        beside = left(moved.reshape(m * s, -1))[0].reshape(m, s, -1)
+        J = ((beside - r) / h.T[:, :, None]).transpose(1, 2, 0)
         J = np.nan_to_num(J, posinf=0.0, neginf=0.0)
         G = np.einsum('spi,spj->sij', J, J)
         scale = np.einsum('sii->si', G) + 1e-12 * (cost[:, None] + 1e-300)
@@ -252,8 +264,11 @@ def _improved(u: np.ndarray, left: Callable[..., tuple[np.ndarray, np.ndarray]],
         trial[:, index] = np.clip(u[:, index] - np.clip(step, -_LONGEST, _LONGEST), 0.0, 1.0)
         r_trial, cost_trial = left(trial)
         better = cost_trial < cost
+        vain = 0 if (cost_trial < _USEFUL * cost).any() else vain + 1
         u = np.where(better[:, None], trial, u)
         r = np.where(better[:, None], r_trial, r)
         cost = np.where(better, cost_trial, cost)
         damping = np.where(better, damping / 5.0, damping * 5.0)
-    return u
+        if vain == _VAIN:
+            break
+    return u, cost

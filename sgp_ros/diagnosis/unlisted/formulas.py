@@ -17,7 +17,7 @@ import numpy as np
 
 from sgp_ros.diagnosis.criteria import PER_PARAMETER, PER_UNUSUAL
 from sgp_ros.diagnosis.explain.fitted_model import Model
-from sgp_ros.diagnosis.unlisted.curves import Curve, Followed, follow, hats
+from sgp_ros.diagnosis.unlisted.curves import Curve, Followed, follow, hats, in_position
 from sgp_ros.diagnosis.unlisted.sentences import (
     COEFFICIENTS,
     of_position,
@@ -153,7 +153,7 @@ def formulas(
 
     def tried(some: Iterable[str], near: Mapping[str, float]) -> Iterator[_Tried]:
         for text in some:
-            formula = read_formula(text.replace('X', 'q[X]'), is_law=True)
+            formula = in_position(text)
             shape = [n for n in formula.parameters if n not in COEFFICIENTS]
             followed = follow(formula, curve, {n: seen.ends(n)[:2] for n in shape}, near)
             if followed is not None:
