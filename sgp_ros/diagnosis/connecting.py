@@ -140,9 +140,12 @@ def _connected(
         if plain.equations.filter.cutoff > cutoff:
             on_band = compared(plain.recordings, tree, next(each), cutoff)
             gain = _gain(on_band, corrected, price)
-    if gain < (-ALIKE if _stands_for_gains(plain, found) else PER_EFFECT):
+    is_one_law = _stands_for_gains(plain, found)
+    if gain < (-ALIKE if is_one_law else PER_EFFECT):
         is_alike = gain + rare >= -ALIKE
         return _beside(plain, found.errors, gain, _named(corrected)) if is_alike else plain
+    if is_one_law:  # under another name it is there anyway
+        gain = max(gain, found.end.evidence - found.start.evidence - price)
     found, corrected = _refined(plain, found, corrected, tree, each)
     errors = tuple(error_finding(found, i, gain) for i in range(len(found.errors)))
     least = min(range(len(errors)), key=lambda i: errors[i].probability)

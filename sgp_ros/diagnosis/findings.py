@@ -21,7 +21,7 @@ from sgp_ros.diagnosis.decide.certainty import Probabilities
 from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision
 from sgp_ros.diagnosis.decide.differences import Several
 from sgp_ros.diagnosis.decide.everyday import widened
-from sgp_ros.diagnosis.decide.reasons import why_not
+from sgp_ros.diagnosis.decide.reasons import held_remarks, why_not
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.in_recording import InRecording
 from sgp_ros.diagnosis.explain.regression import Columns
@@ -30,7 +30,6 @@ from sgp_ros.diagnosis.locate.remainder import Remainder, region
 from sgp_ros.diagnosis.result import Difference, Finding, Location, Parameter, ParameterError
 from sgp_ros.diagnosis.shown import Dependence
 from sgp_ros.physics.catalogue import VELOCITY_FILTER_LAG, VISCOUS_FRICTION
-from sgp_ros.physics.drive import Drive
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.place import joint_name
 from sgp_ros.physics.servo import Servo
@@ -227,14 +226,7 @@ def bound_remarks(decision: Decision) -> tuple[str, ...]:
                 f'{", ".join(names)} of {where}: at the limit of what this recording can '
                 'determine, so no interval is given; the true value may lie beyond.'
             )
-    drive = motion.drive.targets if isinstance(motion.drive, Servo) else motion.drive
-    if isinstance(drive, Drive) and any(s.effect.is_late for s in decision.model.effects):
-        period = 1e3 * float(np.median(np.diff(drive.times)))
-        remarks.append(
-            f'Commands are taken to hold until the next one, {period:.3g} ms later. If they are '
-            f'samples of a faster controller, the delay is {0.5 * period:.3g} ms longer.'
-        )
-    return tuple(remarks)
+    return (*remarks, *held_remarks(decision.model))
 
 
 def _unknown(

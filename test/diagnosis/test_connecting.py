@@ -201,6 +201,27 @@ def test_an_error_that_is_not_certain_must_be_worth_it_beside_physics(
     assert [e.effects for e in said.equivalents] == [(('all', 'scale'),)] * is_said
 
 
+@pytest.mark.parametrize(('is_one_law', 'told'), [(True, 170.0), (False, None)])
+def test_gains_that_a_torque_constant_imitates_are_as_certain_as_their_search(
+    monkeypatch, is_one_law, told
+):
+    """Under the name of a motor they are there anyway; elsewhere they must be worth more."""
+    said = []
+    found = _found(monkeypatch, lambda *_: _of(10.0), ())
+    start, end = SimpleNamespace(evidence=10.0), SimpleNamespace(evidence=200.0)
+    found = replace(found, start=start, end=end)
+    for name, stub in {
+        '_gain': lambda *_: -1.0, 'price_of': lambda _: (20.0, 0.0),
+        '_stands_for_gains': lambda *_: is_one_law, '_named': lambda _: frozenset(),
+        '_beside': lambda plain, *_: plain,
+        'error_finding': lambda _found, _i, gain: (
+            said.append(gain) or SimpleNamespace(probability=0.99)),
+    }.items():  # fmt: skip
+        monkeypatch.setattr(connecting, name, stub)
+    connecting._connected(_of(10.0), found, None, in_halves(lambda _: None))
+    assert said == ([told] if is_one_law else [])
+
+
 @pytest.mark.parametrize(('joint', 'gain', 'is_undone'), [('elbow', 1.57, True),
                                                         ('elbow', 1.2, False),
                                                         ('shoulder', 1.57, False)])  # fmt: skip

@@ -11,8 +11,10 @@ from sgp_ros.diagnosis import findings
 from sgp_ros.diagnosis.connected import Connected
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, SLIGHT_REST
 from sgp_ros.diagnosis.findings import verdict_of
-from sgp_ros.physics.catalogue import COMMAND_DELAY
+from sgp_ros.physics.catalogue import COMMAND_DELAY, VISCOUS_FRICTION
 from sgp_ros.physics.drive import Drive
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.place import Place
 from sgp_ros.physics.servo import Servo
 
 LITTLE, MUCH, SLIGHT = 0.5 * COUNTED_SHARE, 2.0 * COUNTED_SHARE, 0.5 * SLIGHT_REST
@@ -78,8 +80,9 @@ def test_a_delay_of_commands_or_targets_comes_with_how_long_they_hold(is_target)
     """A log may have samples of what a faster controller sends, which it cannot tell."""
     commands = Drive(0.01 * np.arange(50.0), np.zeros((50, 2)), ((0.0, 50),), 0.01)
     none = np.zeros((50, 1))
-    servo = Servo(commands, 0.01, (0,), np.ones(1), np.ones(1), none, none, none)
-    motion = SimpleNamespace(drive=servo if is_target else commands)
+    servo = Servo(commands, 0.01, (0,), 1.5 * np.ones(1), np.ones(1), none, none, none)
+    tree = SimpleNamespace(joint_names=('knee',))
+    motion = SimpleNamespace(drive=servo if is_target else commands, tree=tree)
     late = SimpleNamespace(
         effect=COMMAND_DELAY, at_bounds=lambda _: (), report=lambda _: {'delay': 0.02}
     )
@@ -88,5 +91,8 @@ def test_a_delay_of_commands_or_targets_comes_with_how_long_they_hold(is_target)
     (said,) = findings.bound_remarks(SimpleNamespace(model=model))
     assert '10 ms later' in said
     assert 'the delay is 5 ms longer' in said
+    model.effects = (EffectAt(VISCOUS_FRICTION, Place(0), coefficients=np.array([0.1])),)
+    said = findings.bound_remarks(SimpleNamespace(model=model))
+    assert [x for x in said if 'larger, by 0.0075 on knee.' in x] == [*said[:is_target]]
     model.effects = ()
     assert not findings.bound_remarks(SimpleNamespace(model=model))

@@ -14,6 +14,10 @@ from sgp_ros.diagnosis.decide.scale import Scale, beyond_noise
 from sgp_ros.diagnosis.explain.credibility import is_sound
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.physics.catalogue import VISCOUS_FRICTION
+from sgp_ros.physics.drive import Drive
+from sgp_ros.physics.place import joint_name
+from sgp_ros.physics.servo import Servo
 
 _MOST_DIGITS = 4
 _FIT = 'it predicts the acceleration less well'
@@ -112,6 +116,32 @@ def _unsupported(model: Model, scale: Scale) -> str:
     if evidence.min() > EVIDENCE:
         return 'this recording prefers neither of the two clearly'
     return 'it does not help to predict parts of the recording that were left out'
+
+
+def held_remarks(model: Model) -> Iterator[str]:
+    """Yield what numbers of a model rest on commands that hold until the next one.
+
+    Samples of what a faster controller sends are half a period older on the average than commands
+    that hold: where no delay is named, gains make viscous friction of it.
+    """
+    motion = model.frame.equations.motion
+    servo = motion.drive if isinstance(motion.drive, Servo) else None
+    drive = servo.targets if servo is not None else motion.drive
+    if not isinstance(drive, Drive):
+        return
+    period, said = 1e3 * float(np.median(np.diff(drive.times))), ''
+    if any(s.effect.is_late for s in model.effects):
+        said = f'the delay is {0.5 * period:.3g} ms longer'
+    elif servo is not None and not servo.is_recorded:
+        oiled = (s.place.joint for s in model.effects if s.effect is VISCOUS_FRICTION)
+        more = ', '.join(f'{5e-4 * period * servo.kp[j]:.2g} on {joint_name(motion, j)}'
+                         for j in oiled)  # fmt: skip
+        said = f'the coefficient of viscous friction is larger, by {more}' if more else ''
+    if said:
+        yield (
+            f'Commands are taken to hold until the next one, {period:.3g} ms later. If they are '
+            f'samples of a faster controller, {said}.'
+        )
 
 
 def left_remarks(equations: Equations, model: Model, unknown: Collection[int]) -> Iterator[str]:

@@ -38,7 +38,7 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.unlisted.beside import PLAIN, acts_as_bodies, law_of, own_effects, says_less
 from sgp_ros.diagnosis.unlisted.search import search
 from sgp_ros.diagnosis.unlisted.searched import Searched
-from sgp_ros.diagnosis.unlisted.tried import leaves_less, promises
+from sgp_ros.diagnosis.unlisted.tried import is_beaten, promises
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.place import Place
 
@@ -102,11 +102,10 @@ def with_laws(equations: Equations, comparison: Comparison, decision: Decision) 
 
 
 def _is_better(scale: Scale, searched: Searched, decision: Decision) -> bool:
-    """Return whether a force is worth more than all that is asserted, and leaves clearly less."""
+    """Return whether a force beats all that is asserted."""
     asserted, forms = decision.tentative or decision.model, scale.of_forms()
-    least = forms.worth(asserted) + ALIKE
-    return any(forms.worth(m) > least and leaves_less(m, asserted, searched.joint)
-               for m in (searched.smooth, *searched.laws[:1]))  # fmt: skip
+    found = (searched.smooth, *searched.laws[:1])
+    return any(is_beaten(forms, asserted, m, searched.joint) for m in found)
 
 
 def _bent(model: Model) -> set[int]:

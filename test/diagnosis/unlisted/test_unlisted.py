@@ -639,11 +639,21 @@ def test_what_bent_bodies_and_rare_laws_say_is_asked_again(monkeypatch, equation
 
 
 @pytest.mark.parametrize(
-    ('worth', 'left', 'is_better'),
-    [(ALIKE + 1.0, 0.1, True), (ALIKE - 1.0, 0.1, False), (ALIKE + 1.0, 0.6, False)],
+    ('worth', 'left', 'bends', 'is_better'),
+    [
+        (ALIKE + 1.0, 0.1, False, True),
+        (ALIKE - 1.0, 0.1, True, False),
+        (ALIKE + 1.0, 0.6, False, False),
+        (ALIKE + 1.0, 0.6, True, True),
+    ],
 )
-def test_a_form_is_better_than_all_that_is_asserted(worth, left, is_better):
-    """By more than a recording prefers between models that are alike, and by what it leaves."""
+def test_a_form_is_better_than_all_that_is_asserted(monkeypatch, worth, left, bends, is_better):
+    """By more than a recording prefers between models that are alike, and by what it leaves.
+
+    Or where laws with a shape of their own were distorted to imitate it: a spring and an end stop
+    a pull that grows as a hyperbola.
+    """
+    monkeypatch.setattr(tried, 'is_bent', lambda *_: bends)
     known = ((0.5 * worth, left), (worth, left), (0.0, 1.0))
     smooth, law, asserted = (
         SimpleNamespace(worth=w, mean_square=np.array([9.0, x])) for w, x in known
