@@ -92,7 +92,10 @@ def _is_open(e: Tried) -> bool:
 
 
 def _slopes(found: Connection, plain: Connected, equations: Equations, tree: Tree) -> np.ndarray:
-    """Return the force that each number lacks per unit while it is too small, (n, k, m)."""
+    """Return the force that each number lacks per unit while it is too small, (n, k, m).
+
+    None at a joint that does not move, which has no equation.
+    """
 
     def lacking(errors: list[Tried]) -> np.ndarray:
         undone = undoing(errors)[-1].correction
@@ -109,7 +112,7 @@ def _slopes(found: Connection, plain: Connected, equations: Equations, tree: Tre
             moved = replace(e, numbers=e.numbers + step * np.eye(len(e.numbers))[m])
             there = lacking([*found.errors[:i], moved, *found.errors[i + 1 :]])
             slopes.append((there - now) / step)
-    return np.stack(slopes, axis=2)
+    return np.stack(slopes, axis=2) * equations.motion.moves[:, None]
 
 
 def _estimated(

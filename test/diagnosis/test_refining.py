@@ -112,3 +112,9 @@ def test_a_slope_is_that_of_what_a_corrected_recording_lacks(recorded, robots):
         motion = observe(correction.recording(raw), tree, choose_bandwidth(raw, tree))
         lacks.append(motion.effort - motion.nominal_effort)
     assert (slope.T - (lacks[1] - lacks[0]) / 1e-3).std() < 0.01 * slope.std()
+    still = SimpleNamespace(
+        filter=plain.equations.filter, motion=SimpleNamespace(moves=np.array([False, True]))
+    )
+    (moving,) = refining._slopes(_of(error), plain, still, tree).T
+    assert not moving[0].any()
+    assert (moving[1] == slope[1]).all()
