@@ -11,6 +11,7 @@ the smaller is what is left of it, and least squares would follow.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,15 +19,15 @@ import numpy as np
 from sgp_ros.batch.least_squares import correlation_factor
 from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.compare.trajectory import observe
+from sgp_ros.diagnosis.compare.trajectory import RawTrajectory, observe
 from sgp_ros.diagnosis.connected import Connected
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.regression import Columns, dry_joints
-from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.errors import EFFORT_SCALE
 from sgp_ros.diagnosis.setup.search import Connection, Tried, undoing
 from sgp_ros.rigid.tree import Tree
+from sgp_ros.robots.observed_motion import ObservedMotion
 
 _PART = 0.1
 """Part of the first step of a search by which a number is moved for its slope."""
@@ -97,21 +98,21 @@ def _slopes(found: Connection, plain: Connected, equations: Equations, tree: Tre
     None at a joint that does not move, which has no equation.
     """
 
-    def lacking(errors: list[Tried]) -> np.ndarray:
-        undone = undoing(errors)[-1].correction
-        motion = observe(plain.recordings.corrected(undone).learned, undone.tree(tree), band)
+    def lacking(motion: ObservedMotion) -> np.ndarray:
         return np.asarray(motion.effort + motion.stated_force - motion.nominal_effort)
 
-    last: Correction = found.errors[-1].correction
-    learned = plain.recordings.corrected(last).learned
-    band = choose_bandwidth(learned, last.tree(tree)).up_to(equations.filter.cutoff)
-    now, slopes = lacking(list(found.errors)), []
+    def undone(errors: Sequence[Tried]) -> tuple[RawTrajectory, Tree]:
+        correction = undoing(errors)[-1].correction
+        return plain.recordings.corrected(correction).learned, correction.tree(tree)
+
+    band = choose_bandwidth(*undone(found.errors)).up_to(equations.filter.cutoff)
+    now, slopes = lacking(equations.motion), []
     for i, e in enumerate(found.errors):
         steps = _PART * e.hypothesis.steps_at(e.numbers) if _is_open(e) else ()
         for m, step in enumerate(steps):
             moved = replace(e, numbers=e.numbers + step * np.eye(len(e.numbers))[m])
-            there = lacking([*found.errors[:i], moved, *found.errors[i + 1 :]])
-            slopes.append((there - now) / step)
+            errors = [*found.errors[:i], moved, *found.errors[i + 1 :]]
+            slopes.append((lacking(observe(*undone(errors), band)) - now) / step)
     return np.stack(slopes, axis=2) * equations.motion.moves[:, None]
 
 
@@ -136,9 +137,10 @@ def _estimated(
     J, y = J[:, :-1], frame.y - J[:, -1]
     scale = np.sqrt((J * J).sum(axis=0))
     scale[scale == 0.0] = np.inf
-    inverse = np.linalg.pinv((J / scale).T @ (J / scale), rcond=_DETERMINED, hermitian=True)
-    best = inverse @ ((J / scale).T @ y)
-    residual = (y - (J / scale) @ best)[: held.d.size].reshape(held.d.shape)
+    J = J / scale
+    inverse = np.linalg.pinv(J.T @ J, rcond=_DETERMINED, hermitian=True)
+    best = inverse @ (J.T @ y)
+    residual = (y - J @ best)[: held.d.size].reshape(held.d.shape)
     wider = max(correlation_factor(r) for r in residual.T)
     std = np.sqrt(wider * np.diag(inverse)) / scale
     m = slopes.shape[2]

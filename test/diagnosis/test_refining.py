@@ -53,6 +53,11 @@ def _connected(raw, tree, correction=NEUTRAL):
     return Connected(recordings, equations, Several(equations, None, decision, model, {}))
 
 
+def _seen(motion):
+    names = ('effort', 'stated_force', 'nominal_effort')
+    return {name: getattr(motion, name) for name in names}
+
+
 def _tried(motion, number, std, effect='position_scale'):
     (one,) = [h for h in hypotheses(motion) if h.effect == effect and h.joint == 'joint1']
     numbers = np.array([number])
@@ -105,7 +110,8 @@ def test_a_slope_is_that_of_what_a_corrected_recording_lacks(recorded, robots):
     raw, tree = recorded[0], robots[2][1]
     plain = _connected(raw, tree)
     error = _tried(plain.equations.motion, 1.04, 0.02)
-    (slope,) = refining._slopes(_of(error), plain, plain.equations, tree).T
+    undone = _connected(raw, tree, error.correction).equations
+    (slope,) = refining._slopes(_of(error), plain, undone, tree).T
     lacks = []
     for scale in (1.04, 1.041):
         correction = replace(NEUTRAL, scale=np.array([1.0, scale]))
@@ -113,7 +119,8 @@ def test_a_slope_is_that_of_what_a_corrected_recording_lacks(recorded, robots):
         lacks.append(motion.effort - motion.nominal_effort)
     assert (slope.T - (lacks[1] - lacks[0]) / 1e-3).std() < 0.01 * slope.std()
     still = SimpleNamespace(
-        filter=plain.equations.filter, motion=SimpleNamespace(moves=np.array([False, True]))
+        filter=undone.filter,
+        motion=SimpleNamespace(**_seen(undone.motion), moves=np.array([False, True])),
     )
     (moving,) = refining._slopes(_of(error), plain, still, tree).T
     assert not moving[0].any()

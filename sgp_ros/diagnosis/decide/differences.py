@@ -165,10 +165,9 @@ class _Search:
                       *self._fewer(model)]  # fmt: skip
             for r in range(self.count):
                 trials += self._added(model, r)
-            least = self.worth(model) + ALIKE
             possible = (m for m in trials if m.is_possible() and np.isfinite(m.score))
-            better = [m for m in possible if self.worth(m) > least]
-            better.sort(key=self.worth, reverse=True)
+            worth, least = {m: self.worth(m) for m in possible}, self.worth(model) + ALIKE
+            better = sorted((m for m in worth if worth[m] > least), key=lambda m: -worth[m])
             if (best := next(filter(self._holds, better), None)) is None:
                 return model
             model = best
@@ -291,9 +290,10 @@ class _Search:
         assert recording is not None
         there = recording[equations.filter.rows] == last.effect.recording
         share = (model.forces[-1][there] ** 2).mean(axis=0) / moving_power(equations)
-        floor = self.scale.floor * self.scale.power
-        evidence = float(support(self.columns, model, floor, self.scale.rows)[-1])
-        return EVIDENCE < evidence < math.inf and float(share.max()) > COUNTED_SHARE
+        if share.max() <= COUNTED_SHARE:
+            return False
+        limits = self.scale.floor * self.scale.power, self.scale.rows
+        return EVIDENCE < float(support(self.columns, model, *limits)[-1]) < math.inf
 
 
 def _same(law: Effect) -> Effect:

@@ -288,7 +288,7 @@ def beside(listed: Model, joint: int, *, is_open: bool) -> Iterable[tuple[Effect
 
 
 def _friction(joint: int) -> tuple[EffectAt, ...]:
-    return tuple(EffectAt(e, Place(joint)) for e in PLAIN[:2])
+    return tuple(EffectAt(e, Place(joint)) for e in (COULOMB_FRICTION, VISCOUS_FRICTION))
 
 
 def _subsets(effects: tuple[EffectAt, ...]) -> list[tuple[EffectAt, ...]]:

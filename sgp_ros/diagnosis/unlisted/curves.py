@@ -144,13 +144,13 @@ def follow(
 
     known = axes.high <= axes.low
     u = _starts(free, axes, near)
-    _, cost = left(u)
+    r, cost = left(u)
     kept = np.argsort(cost)[: min(_KEPT, int(np.isfinite(cost).sum()))]
     if not len(kept):
         return None
-    u, cost = u[kept], cost[kept]
+    u, r, cost = u[kept], r[kept], cost[kept]
     if len(free) > known.sum():
-        u, cost = _improved(u, left, ~known)
+        u, cost = _improved(u, r, cost, left, ~known)
     best = int(np.argmin(cost))
     return Followed(dict(zip(free, axes.at(u)[best].tolist(), strict=True)), float(cost[best]))
 
@@ -241,14 +241,17 @@ def _left(values: np.ndarray, curve: Curve) -> tuple[np.ndarray, np.ndarray]:
     return r, np.where(bad, np.inf, (r * r).sum(axis=1))
 
 
-def _improved(u: np.ndarray, left: Callable[..., tuple[np.ndarray, np.ndarray]],
-              free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+def _improved(
+    u: np.ndarray, r: np.ndarray, cost: np.ndarray,
+    left: Callable[..., tuple[np.ndarray, np.ndarray]], free: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Return places u (s, m) in the unit box after Levenberg-Marquardt steps, each its own.
 
     With the sums of squares there, (s,). They end where two steps improve none by a thousandth.
+    Residuals r (s, p) and their sums of squares are those at the start.
     """
-    damping, index = np.full(len(u), 1e-2), np.flatnonzero(free)
-    (s, m), (r, cost), vain = (len(u), len(index)), left(u), 0
+    damping, index, vain = np.full(len(u), 1e-2), np.flatnonzero(free), 0
+    s, m = len(u), len(index)
     for _ in range(_STEPS):
         h = np.where(u[:, index] + _MOVE <= 1.0, _MOVE, -_MOVE)
         moved = np.repeat(u[None], m, axis=0)

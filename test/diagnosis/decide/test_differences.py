@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
@@ -116,9 +117,21 @@ def test_a_difference_counts_beside_what_moves_the_robot(
     assert differences._Search(None, scale, 2)._holds(model) is holds
 
 
+@dataclass(frozen=True)
+class _Worth:
+    """A model of so much worth."""
+
+    name: str
+    size: float
+    score: float = 0.0
+
+    def is_possible(self):
+        return True
+
+
 def test_a_difference_that_does_not_count_hides_no_other(monkeypatch):
     search = differences._Search(None, None, 2)
-    models = {name: SimpleNamespace(is_possible=lambda: True, score=0.0, size=size, name=name)
+    models = {name: _Worth(name, size)
               for name, size in (('none', 0.0), ('slight', 9.0), ('clear', 5.0))}  # fmt: skip
     more = {'none': ['slight', 'clear']}
     fakes = {
