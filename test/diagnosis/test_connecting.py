@@ -222,6 +222,39 @@ def test_gains_that_a_torque_constant_imitates_are_as_certain_as_their_search(
     assert said == ([told] if is_one_law else [])
 
 
+@pytest.mark.parametrize(
+    ('before', 'after', 'gain', 'undone', 'times'),
+    [
+        (False, False, 5.0, 'found', 1),
+        (True, False, 5.0, 'better', 1),
+        (False, True, 5.0, 'better', 2),
+        (False, True, -5.0, 'found', 2),
+    ],
+)
+def test_better_numbers_are_undone(monkeypatch, before, after, gain, undone, times):
+    """Those of the first look before anything is compared, those of the last if worth more."""
+    compared = []
+    found = _found(monkeypatch, lambda *_: compared.append(1) or _of(10.0), ())
+    (error,) = found.errors
+    better = SimpleNamespace(**{**vars(error), 'correction': SimpleNamespace(tree=lambda t: t)})
+    corrections = {'found': error.correction, 'better': better.correction}
+    moves = iter([before, after])
+
+    def refined(now, *_):
+        return (replace(now, errors=(better,)), True) if next(moves) else (now, False)
+
+    def worth(_plain, _corrected, price):
+        return 100.0 if price else gain
+
+    for name, stub in {
+        'refined': refined, '_gain': worth, 'price_of': lambda _: (10.0, 0.0),
+    }.items():  # fmt: skip
+        monkeypatch.setattr(connecting, name, stub)
+    said = connecting._connected(_of(10.0), found, None, in_halves(lambda _: None))
+    assert said.correction is corrections[undone]
+    assert len(compared) == times
+
+
 @pytest.mark.parametrize(('joint', 'gain', 'is_undone'), [('elbow', 1.57, True),
                                                         ('elbow', 1.2, False),
                                                         ('shoulder', 1.57, False)])  # fmt: skip
