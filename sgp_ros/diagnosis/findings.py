@@ -51,9 +51,9 @@ def asserted(
     common = [i for i, s in enumerate(model.effects) if not isinstance(s.effect, InRecording)]
     forces = [model.forces[i] for i in common]
     std = widened(equations, model, decision.unknown) if common else ()
-    for i in common:  # of friction beside something unknown, whose only number is its size
-        least = decision.standing.get(model.effects[i].key, 0.0)
-        std[i].update({name: max(x, least) for name, x in std[i].items()})
+    for i in common:  # of everyday laws beside something unknown, whose only number is their size
+        own = decision.standing.get(model.effects[i].key, 0.0)
+        std[i].update(dict.fromkeys(std[i], own) if own else {})
     findings = [
         doubted_if_late(
             doubted_if_none(_finding(decision, model, i, std[i], chances), model.effects[i]),

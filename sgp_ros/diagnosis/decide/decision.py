@@ -58,7 +58,9 @@ class Decision:
         tentative: best model where nothing is adequate.
         against: score of the best model without effects [nats].
         refusals: why models that could be asserted are not, by their keys.
-        standing: friction that stands at unknown joints: standard deviations, by its keys.
+        standing: everyday laws that stand at unknown joints: standard deviations, by their keys.
+        shaped: by unknown joint whose force has a known shape, a model without that force, with
+            the everyday laws that stand beside it, and their standard deviations, by their keys.
     """
 
     verdict: str
@@ -71,6 +73,7 @@ class Decision:
     against: float = 0.0
     refusals: Mapping[object, str] = field(default_factory=dict)
     standing: Mapping[object, float] = field(default_factory=dict)
+    shaped: Mapping[int, tuple[Model, Mapping[object, float]]] = field(default_factory=dict)
 
     def without(self, why: str) -> Decision:
         """Return the decision with the reason why its model is not asserted after all."""

@@ -1,18 +1,19 @@
 """Everyday friction of a joint beside something there that has no name.
 
-A joint that no model describes may still have the friction that every joint has. It stands where
-it does not lean on the rest: fitted in each half of each variable alone, beside bodies of any
-kind, it is nearly the force that it is in the whole. Where much of the rest is a friction, of
-another form, of earlier speeds or one that another variable changes, what is unknown is the
-friction itself. The larger the rest is beside it, the nearer the halves must be: it may be a part
-of the unknown. The intervals of its numbers hold those of all halves, for the rest that bends them
-is not noise.
+A joint that no model describes may still have the friction that every joint has. Where the unknown
+is a force of one variable whose shape is known, what stands beside that force has its number
+there. Elsewhere friction stands where it does not lean on the rest: fitted in each half of each
+variable alone, beside bodies of any kind, it is nearly the force that it is in the whole. Where
+much of the rest is a friction, of another form, of earlier speeds or one that another variable
+changes, what is unknown is the friction itself. The larger the rest is beside it, the nearer the
+halves must be: it may be a part of the unknown. The intervals of its numbers hold those of all
+halves, for the rest that bends them is not noise.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -61,20 +62,41 @@ def with_everyday(equations: Equations, comparison: Comparison, decision: Decisi
         return decision
     if not decision.unknown:
         return _beside_delay(equations, decision)
-    found = {j: _standing(equations, decision.model, j) for j in decision.unknown}
-    standing = {s: std for laws in found.values() for s, std in laws.items()}
-    if not standing:
+    model, standing = _beside_shape(decision) or _beside_unknown(equations, decision)
+    if not standing or not is_credible(model):
         return decision
-    model = _with(equations, decision.model, standing)
-    if not is_credible(model):
-        return decision
-    decision = replace(decision, model=model, standing={s.key: x for s, x in standing.items()})
+    decision = replace(decision, model=model, standing=standing)
     scale, unknown = Scale.of(equations, comparison), list(decision.unknown)
     before, left = comparison.parameters.left[unknown].sum(), model.left[unknown].sum()
     others = np.delete(scale.found(model), unknown).sum()
     if decision.verdict == 'unexplained' and before - left + others > left:
         decision = replace(decision, verdict='missing_physics', tentative=None)
     return decision
+
+
+def _beside_shape(decision: Decision) -> tuple[Model, Mapping[object, float]] | None:
+    """Return what stands beside the force of the only unknown joint, if its shape is known.
+
+    None where that was found beside other laws of the other joints.
+    """
+    joint, *others = decision.unknown
+    model, standing = decision.shaped.get(joint, (decision.model, {}))
+    is_same = model.key - standing.keys() == decision.model.key
+    return (model, standing) if standing and is_same and not others else None
+
+
+def _beside_unknown(
+    equations: Equations, decision: Decision
+) -> tuple[Model, dict[object, float]]:  # fmt: skip
+    """Return a model with the friction that stands at unknown joints, and its deviations."""
+    found = [_standing(equations, decision.model, j) for j in decision.unknown]
+    standing = {s: x for laws in found for s, x in laws.items()}
+    if not standing:
+        return decision.model, {}
+    model, columns = _with(equations, decision.model, standing), Columns(equations)
+    known = zip(model.effects, reported_std(model, columns, decision.unknown), strict=True)
+    spread = {s.key: x for s, x in standing.items()}
+    return model, {s.key: max(spread[s.key], *std.values()) for s, std in known if s.key in spread}
 
 
 def _beside_delay(equations: Equations, decision: Decision) -> Decision:

@@ -20,13 +20,12 @@ from sgp_ros.diagnosis.criteria import (
     ALIKE,
     BENT_BODIES,
     LACKING,
-    LAW_REST,
     LEAST_LAW,
     NEARLY,
     SIGNIFICANT,
 )
 from sgp_ros.diagnosis.decide.certainty import probabilities
-from sgp_ros.diagnosis.decide.cross_validation import repeatable, structure
+from sgp_ros.diagnosis.decide.cross_validation import structure
 from sgp_ros.diagnosis.decide.decision import Decision, decide, refused
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, moved
 from sgp_ros.diagnosis.decide.scale import Scale
@@ -37,7 +36,7 @@ from sgp_ros.diagnosis.explain.joint_search import usual
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.unlisted.beside import PLAIN, acts_as_bodies, law_of, own_effects, says_less
 from sgp_ros.diagnosis.unlisted.search import search
-from sgp_ros.diagnosis.unlisted.searched import Searched
+from sgp_ros.diagnosis.unlisted.searched import Searched, leaves_more
 from sgp_ros.diagnosis.unlisted.tried import is_beaten, promises
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.place import Place
@@ -190,9 +189,11 @@ def _decided(
     named = f'a force without a formula describes {joint} better than listed effects do'
     decision = refused(equations, found.comparison, found.decision, searched.joint, named)
     laws = searched.laws[:_RIVALS]
-    refusals = {m.key: f'no formula is asserted: {why}' for m in laws}
+    refusals = dict(decision.refusals) | {m.key: f'no formula is asserted: {why}' for m in laws}
+    beside = searched.everyday(Columns(equations), Scale.of(equations, found.comparison))
+    shaped = {**decision.shaped, **({searched.joint: beside} if beside else {})}
     decision = replace(
-        decision, rivals=(*laws, *decision.rivals), refusals=dict(decision.refusals) | refusals
+        decision, rivals=(*laws, *decision.rivals), refusals=refusals, shaped=shaped
     )
     return replace(found, decision=decision, why_not=found.why_not | {searched.joint: why})
 
@@ -263,7 +264,7 @@ def _objection(equations: Equations, comparison: Comparison, searched: Searched)
         return 'no formula tried stays within the 95 % band of the shape'
     law, (ratio, chance) = law_of(best, searched.joint), searched.lack_of_fit
     assert law is not None
-    if (ratio > LACKING and chance < SIGNIFICANT) or _leaves_more(equations, best, law):
+    if (ratio > LACKING and chance < SIGNIFICANT) or leaves_more(equations, best, law):
         return 'the best formula follows the force only approximately'
     motion = equations.motion
     if law.at_bounds(motion):
@@ -272,15 +273,6 @@ def _objection(equations: Equations, comparison: Comparison, searched: Searched)
         return 'other bodies, or other lengths, than those of the robot file would act much alike'
     wide = law.force(moved(motion, np.inf, 1.0, 0.0))
     return '' if np.isfinite(wide).all() else 'the best formula is not finite over the range'
-
-
-def _leaves_more(equations: Equations, model: Model, law: EffectAt) -> bool:
-    """Return whether a law leaves more of its force than that of a chosen form may."""
-    joint = law.place.joint
-    asked = np.arange(equations.d.shape[1]) == joint
-    share = float(repeatable(equations, model.residual, asked)[0, joint])
-    force = model.forces[[s is law for s in model.effects].index(True)][:, joint]
-    return share * float(model.mean_square[joint]) > LAW_REST * float((force**2).mean())
 
 
 def _doubt(

@@ -231,7 +231,7 @@ def law(
     parameters = [
         LawParameter(name, _unit(force, per, seen.unit, _power(text, name, seen, numbers)))
         if name in COEFFICIENTS else _shape(name, smooth, motion, seen, numbers)
-        for name in sorted(formula.parameters) if name not in others
+        for name in sorted(formula.parameters, key=str.swapcase) if name not in others
     ]  # fmt: skip
     parameters += others.values()
     gate = '' if smooth.is_of_own_speed else _OF_GATE.get(smooth.gate, smooth.gate)
@@ -248,8 +248,8 @@ def _shape(
     """Return a parameter that is not a coefficient, with unit, start and range."""
     if name == MEMORY:
         assert smooth.variable.memory is not None
-        kind, start = smooth.variable.memory
-        unit = seen.unit if kind == 'play' else 's'
+        _, start = smooth.variable.memory
+        unit = seen.unit if smooth.variable.is_of_width else 's'
         return LawParameter(name, unit, start / 3.0, start=start, high=3.0 * start)
     if name == RATIO:
         assert smooth.variable.other is not None

@@ -60,15 +60,17 @@ OF_VELOCITY = (
     '(exp(abs(X)/v0) - 1)*sign(X)', 'X**2', 'max(X, 0)', 'min(X, 0)', 'max(X, 0)**2',
     'min(X, 0)**2', 'a*max(X, 0)**2 + b*min(X, 0)**2', 'exp(X/v0)', 'exp(-X/v0)',
     'tanh((X - x0)/w0)', 'max(X - x0, 0)', 'max(x0 - X, 0)', 'X**2/(1 + (X/v0)**2)',
-    'max(tanh(X/v0), 0)', 'min(tanh(X/v0), 0)',
+    'max(tanh(X/v0), 0)', 'min(tanh(X/v0), 0)', 'X*tanh((abs(X) - v0)/w0)',
 )  # fmt: skip
 """Terms of a velocity that begin at rest, or act as those do."""
 OF_SPEED = ('abs(X)', '(abs(X)/r)**p0', 'tanh(abs(X)/v0)', 'exp(-abs(X)/v0)', 'exp(-(X/v0)**2)',
-            'log(1 + abs(X)/v0)')  # fmt: skip
+            'log(1 + abs(X)/v0)', 'max(abs(X) - v0, 0)', 'max(1 - abs(X)/v0, 0)',
+            'max(1 - (X/v0)**2, 0)', 'tanh((abs(X) - v0)/w0)')  # fmt: skip
 """Terms of a velocity, whichever its direction."""
 OF_FRICTION = (
     'sign(X)', 'exp(-abs(X)/v0)*sign(X)', 'exp(-(X/v0)**2)*sign(X)', 'sign(X)/(1 + abs(X)/v0)',
-    'sqrt(abs(X))*sign(X)', 'tanh((abs(X) - v0)/w0)*sign(X)',
+    'sqrt(abs(X))*sign(X)', 'tanh((abs(X) - v0)/w0)*sign(X)', 'max(1 - abs(X)/v0, 0)*sign(X)',
+    'max(1 - (X/v0)**2, 0)*sign(X)',
 )  # fmt: skip
 """Terms of the joint's own velocity that jump, or nearly so, at rest."""
 FACTORS = ('X', 'X**2', 'exp(X/w0)', 'exp(-X/w0)', 'tanh((X - x0)/w0)', f'exp(-{_U}**2)',

@@ -162,9 +162,9 @@ class SmoothForce(Effect):
             return SLOWEST * fastest, fastest
         if self.variable.memory is None:
             return np.zeros(0), np.zeros(0)
-        kind, least = self.variable.memory
+        _, least = self.variable.memory
         lag = LONGEST_LAG * motion.step * len(motion.position)
-        most = MOST_PLAY / LEAST_PLAY * least if kind == 'play' else lag
+        most = MOST_PLAY / LEAST_PLAY * least if self.variable.is_of_width else lag
         return np.array([least]), np.array([max(most, 2.0 * least)])
 
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:

@@ -18,7 +18,7 @@ from sgp_ros.diagnosis.unlisted.beside import law_of
 from sgp_ros.diagnosis.unlisted.formulas import FoundLaw
 from sgp_ros.diagnosis.unlisted.searched import Searched
 from sgp_ros.diagnosis.unlisted.shapes import SmoothForce, smooth_of
-from sgp_ros.diagnosis.unlisted.variables import SLIP
+from sgp_ros.diagnosis.unlisted.variables import BEHIND, LEAD
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.formula import Formula
 from sgp_ros.physics.grammar import MEMORY
@@ -130,8 +130,8 @@ def _beyond(law: EffectAt, searched: Searched, x: np.ndarray) -> np.ndarray:
     """Return a formula over its factor at places of its variable (b,); NaN if of other kind.
 
     A sign is that of a fast motion ahead, a factor that is a speed or an effort is one; signals
-    with memory have settled, and what a joint is ahead of its lag is what it is ahead of zero. A
-    formula that is the factor is left out.
+    with memory have settled, and what a joint is ahead of its lag or play is what it is ahead of
+    zero. A lead is that of a joint at rest. A formula that is the factor is left out.
     """
     _, smooth = smooth_of(searched.smooth, searched.joint)
     assert isinstance(law.effect, FoundLaw)
@@ -143,7 +143,8 @@ def _beyond(law: EffectAt, searched: Searched, x: np.ndarray) -> np.ndarray:
     ):
         return np.full(len(x), np.nan)
     variable = own.variable
-    factor = np.inf if gate in {'sign', 'soft'} else 1.0
+    past = variable.memory[0] if variable.memory else ''
+    factor = np.inf if gate in {'sign', 'soft'} else 0.0 if past == LEAD else 1.0
 
     def signal(kind: str, joint: str) -> Callable[[object], np.ndarray]:
         if kind == variable.kind and joint == variable.joint:
@@ -151,12 +152,10 @@ def _beyond(law: EffectAt, searched: Searched, x: np.ndarray) -> np.ndarray:
         is_other = variable.other is not None and joint == variable.other[1]
         return lambda _at: np.full(len(x), 0.0 if is_other else factor)
 
-    is_slip = variable.memory is not None and variable.memory[0] == SLIP
-
     def force(formula: Formula) -> np.ndarray:
         value: Callable[[object], object] = formula.compiled(
             lambda name: lambda _at: float(numbers[name]), signal,
-            lambda name, _: (lambda _at, now, _number: 0.0 * now if is_slip else now)
+            lambda name, _: (lambda _at, now, _number: 0.0 * now if past in BEHIND else now)
             if name in MEMORY else None,
         )  # fmt: skip
         return np.broadcast_to(np.asarray(value(None), dtype=np.float64), (len(x),))

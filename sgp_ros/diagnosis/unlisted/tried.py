@@ -31,7 +31,7 @@ from sgp_ros.diagnosis.unlisted.shapes import (
     LawAsFactor,
     SmoothForce,
 )
-from sgp_ros.diagnosis.unlisted.variables import SLIP, Variable
+from sgp_ros.diagnosis.unlisted.variables import LEAD, SLIP, STRETCH, Variable
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.robots.observed_motion import ObservedMotion
 
@@ -128,7 +128,8 @@ def more_forces(motion: ObservedMotion, joint: int) -> Iterator[SmoothForce]:
 
     With a factor that acts one way, is the joint's squared speed, its own position, or the speed
     of another joint, as a gyro sees it; of the joint's motion plus a part of another's, as a
-    tendon or a hose over both sees it; of a motor's torque; and of the past in other ways.
+    tendon or a hose over both sees it; of a motor's torque, or with another motor's as a factor;
+    and of the past in other ways.
     """
     names, own = motion.tree.moving_names, {'q': motion.position, 'dq': motion.velocity}
     for i, kind in itertools.product(motion.moving_joints, own):
@@ -143,9 +144,11 @@ def more_forces(motion: ObservedMotion, joint: int) -> Iterator[SmoothForce]:
                 for gate in ('', 'sign') if kind == 'q' else ('',):
                     yield weighted(motion, joint, i, kind, sign * float(weight), gate)
             if kind == 'q':
-                for variable in (Variable('q', joint, names[joint]), Variable('q', i, names[i])):
+                both = (Variable('q', joint, names[joint]), Variable('q', i, names[i]))
+                gates = ('speed', 'effort') if motion.is_commanded[i] else ('speed',)
+                for variable, gate in itertools.product(both, gates):
                     knots = variable.knots(motion, PIECES)
-                    yield SmoothForce(joint, variable, 'speed', knots, names[joint],
+                    yield SmoothForce(joint, variable, gate, knots, names[joint],
                                       factor_of=(i, names[i]))  # fmt: skip
     for variable in _further(motion, joint):
         yield SmoothForce(joint, variable, '', variable.knots(motion, PIECES), names[joint])
@@ -177,12 +180,15 @@ def _remembering(motion: ObservedMotion, joint: int) -> Iterator[Variable]:
 
 
 def _further(motion: ObservedMotion, joint: int) -> Iterator[Variable]:
-    """Yield motor torques that are commands, delays of the joint's motion, and its slip."""
+    """Yield motor torques that are commands, and the joint's delay, slip, stretch and lead."""
     names, least = motion.tree.moving_names, SHORTEST_LAG * motion.step
+    width = LEAST_PLAY * float(np.ptp(motion.position[:, joint]))
     for i in np.flatnonzero(motion.is_commanded & motion.moves):
         yield Variable('tau', int(i), names[int(i)])
     for kind, memory in itertools.product(('q', 'dq'), ('delay', SLIP)):
         yield Variable(kind, joint, names[joint], memory=(memory, least))
+    for memory, number in ((STRETCH, width), (LEAD, least)):
+        yield Variable('q', joint, names[joint], memory=(memory, number))
 
 
 def without_limits(ranked: Sequence[Model], scale: Scale, joint: int) -> list[Model]:

@@ -14,8 +14,10 @@ DEGREE = 3
 """Of splines over a variable."""
 MEMORY = 'T'
 """Parameter of what remembers."""
-SLIP = 'slip'
-"""Memory of what a joint is ahead of its lag."""
+SLIP, STRETCH, LEAD = 'slip', 'stretch', 'lead'
+"""Distances of a joint ahead of its lag, and of its play; and its position some time ahead."""
+BEHIND = {SLIP: 'lag', STRETCH: 'play'}
+"""The memory that these two are ahead of."""
 RATIO = 'R'
 """Parameter of a sum of two joints."""
 FORCES = {'m': 'N', 'rad': 'N m'}
@@ -26,14 +28,16 @@ FORCES = {'m': 'N', 'rad': 'N m'}
 class Variable:
     """Variable of a force: `q` or `dq` of a joint, of two joints, or an earlier value of it.
 
-    A slip is what a joint is ahead of its lag, as the spring of a spring and damper in series is.
-    The motor torque `tau` of a joint is one, too.
+    A slip is what a joint is ahead of its lag, as the spring of a spring and damper in series is;
+    a stretch what it is ahead of its play, as one in series with dry friction; a lead `q + T dq`,
+    as the error of a controller whose target rests. The motor torque `tau` is one, too.
 
     Attributes:
         kind: `q`, `dq` or `tau`.
         index, joint: of the joint, and its name.
         other: index, name and weight of a joint that is added; None for none.
-        memory: `lag`, `delay`, `slip` or `play` with its number [s, or unit of q]; None for none.
+        memory: `lag`, `delay`, `slip`, `lead` or `play`, `stretch`, with its number [s, or unit of
+            q]; None for none.
     """
 
     kind: str
@@ -46,15 +50,21 @@ class Variable:
     def text(self) -> str:
         """As it stands in a formula."""
         if self.memory:
-            now, past = self._signal(self.joint), self.memory[0]
-            return (
-                f'({now} - lag({now}, {MEMORY}))' if past == SLIP else f'{past}({now}, {MEMORY})'
-            )
+            now, name = self._signal(self.joint), self.memory[0]
+            if name == LEAD:
+                return f'({now} + {MEMORY}*d{now})'
+            past = f'{BEHIND.get(name, name)}({now}, {MEMORY})'
+            return f'({now} - {past})' if name in BEHIND else past
         if self.other is None:
             return self._signal(self.joint)
         _, name, weight = self.other
         sign, times = ('+', f'{RATIO}*') if self.is_weighted else ('+' if weight > 0 else '-', '')
         return f'({self._signal(self.joint)} {sign} {times}{self._signal(name)})'
+
+    @property
+    def is_of_width(self) -> bool:
+        """Whether the number of its memory is a width, not a time."""
+        return self.memory is not None and self.memory[0] in {'play', STRETCH}
 
     @property
     def is_weighted(self) -> bool:
@@ -119,6 +129,8 @@ class Variable:
         x = np.asarray(of[:, self.index])
         if self.memory:
             name, number = self.memory
-            past = remembered('lag' if name == SLIP else name, motion, x, number)
-            return x - past if name == SLIP else past
+            if name == LEAD:
+                return x + number * motion.velocity[:, self.index]
+            past = remembered(BEHIND.get(name, name), motion, x, number)
+            return x - past if name in BEHIND else past
         return x if self.other is None else x + self.other[2] * of[:, self.other[0]]

@@ -13,7 +13,7 @@ from sgp_ros.diagnosis.decide import everyday
 from sgp_ros.diagnosis.decide.certainty import settled_of
 from sgp_ros.diagnosis.decide.decision import Decision
 from sgp_ros.diagnosis.decide.differences import Several
-from sgp_ros.diagnosis.decide.everyday import widened, with_everyday
+from sgp_ros.diagnosis.decide.everyday import _beside_shape, widened, with_everyday
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
@@ -164,6 +164,23 @@ def test_physics_is_missing_where_friction_explains_most(equations_for, size, ve
 )  # fmt: skip
 def test_friction_is_not_named_where_it_is_the_unknown_or_not_seen(equations_for, unknown):
     assert not _decided(equations_for, **unknown)[2].standing
+
+
+@pytest.mark.parametrize('unknown', [(0,), (0, 1)])
+@pytest.mark.parametrize('beside', [(), ('spring',)])
+def test_what_stands_beside_a_known_shape_has_its_number_there(equations_for, unknown, beside):
+    """If that is at the only unknown joint, and was found beside what is told of the others."""
+    equations, comparison, _ = _decided(equations_for, force=_wave(6.0), dry=lambda t, q, s: 0.04)
+    decision = replace(_unexplained(equations)[1], unknown=unknown, excess=np.full(2, 9.0))
+    shaped = fitted(equations, 'coulomb_friction', *beside)
+    key = shaped.effects[0].key
+    decision = replace(decision, shaped={0: (shaped, {key: 0.02})})
+    found = _beside_shape(decision)
+    assert (found is None) is (beside != () or len(unknown) > 1)
+    if found:
+        found = with_everyday(equations, comparison, decision)
+        assert found.model is shaped
+        assert found.standing == {key: 0.02}
 
 
 def test_a_described_joint_stays_as_it_is(rubbed):

@@ -24,14 +24,14 @@ from sgp_ros.diagnosis.explain.comparison import compare_models
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
-from sgp_ros.diagnosis.unlisted import assertion, shapes, tried
+from sgp_ros.diagnosis.unlisted import assertion, searched, shapes, tried
 from sgp_ros.diagnosis.unlisted import search as searching
 from sgp_ros.diagnosis.unlisted.assertion import _in_plain_laws, with_laws
 from sgp_ros.diagnosis.unlisted.beside import earned, is_bent, law_of, refined
 from sgp_ros.diagnosis.unlisted.formulas import Range, texts
 from sgp_ros.diagnosis.unlisted.formulas import law as a_law
 from sgp_ros.diagnosis.unlisted.search import search
-from sgp_ros.diagnosis.unlisted.searched import Searched
+from sgp_ros.diagnosis.unlisted.searched import Searched, leaves_more
 from sgp_ros.diagnosis.unlisted.sentences import COEFFICIENTS
 from sgp_ros.diagnosis.unlisted.shapes import (
     FINE,
@@ -372,6 +372,28 @@ def test_a_finer_spline_has_columns_of_its_own(equations_for):
         assert x.shape[2] == pieces + 3
 
 
+@pytest.mark.parametrize(('memory', 'text', 'expected'), [
+    (('stretch', 0.2), '(q[joint0] - play(q[joint0], T))',
+     lambda q, v: np.clip(q - q[0], -0.1, 0.1)),
+    (('lead', 0.3), '(q[joint0] + T*dq[joint0])', lambda q, v: q + 0.3 * v),
+])  # fmt: skip
+def test_a_variable_is_read_from_its_text_as_it_is_computed(equations_for, memory, text, expected):
+    """The way ahead of its play, while a joint turns one way, and its position some time ahead."""
+    _, equations = equations_for(simulate(CHAINS[1], 11, 3.0, force=_brake))
+    motion, variable = equations.motion, Variable('q', 0, 'joint0', memory=memory)
+    found = variable.values(motion)
+    assert variable.text == text
+    law = a_law(
+        SmoothForce(0, variable, '', variable.knots(motion, PIECES), 'joint0'), motion,
+        Range.of_variable(variable, motion), 'a*X', {},
+    )  # fmt: skip
+    place = law.places(motion)[0]
+    np.testing.assert_allclose(law.columns(motion, place, np.array(memory[1:]))[:, 0], found)
+    q, v = motion.position[:, 0], motion.velocity[:, 0]
+    turned = np.flatnonzero(np.sign(v) != np.sign(v[0]))[0]
+    np.testing.assert_allclose(found[:turned], expected(q, v)[:turned], atol=1e-12)
+
+
 def _middle(text, seen):
     names = read_formula(text.replace('X', 'x'), is_law=True).parameters - {*COEFFICIENTS, 'x'}
     ends = {name: seen.ends(name)[:2] for name in names}
@@ -408,6 +430,7 @@ def test_every_formula_has_the_unit_of_a_force(equations_for, perfect):
             assert np.isfinite(columns).all()
     assert {gate for gate, _, _ in seen} == {*GATES, *MORE_GATES, LAW}
     assert {kind for _, kind, _ in seen} == {'q', 'dq', 'tau'}
+    assert {gate for gate, of, *_ in more if of[0] == 0} == {'speed', 'effort'}
     assert ('', 'q', 0) in seen
 
 
@@ -537,18 +560,78 @@ def test_laws_of_two_joints_are_found_together(equations_for):
         np.testing.assert_allclose(law.force(motion)[:, joint], expected, atol=0.02)
 
 
+def _shaped(equations, gate, effects):
+    """Return a search that ended with a force of the position, and its columns and scale."""
+    columns, motion = Columns(equations), equations.motion
+    variable = Variable('q', 0, 'joint0')
+    smooth = SmoothForce(0, variable, gate, variable.knots(motion, FINE), 'joint0')
+    laws = [EffectAt(EFFECTS[name], Place(0)) for name in effects]
+    sigma = fitted(equations).sigma
+    model = fit(columns, (EffectAt(smooth, Place(0), np.zeros(0)), *laws), sigma, is_free=False)
+    scale = Scale.of(equations, compare_models(equations, lambda _share: None))
+    return Searched(0, model, model, (), np.zeros(0), 0.0), columns, scale
+
+
+@pytest.mark.parametrize(('gate', 'effects', 'standing'), [
+    ('', ('viscous_friction', 'coulomb_friction'), {'viscous_friction': 0.3,
+                                                    'coulomb_friction': 0.25}),
+    ('', ('viscous_friction', 'armature', 'coulomb_friction'), {'viscous_friction': 0.3,
+                                                                'coulomb_friction': 0.25}),
+    ('', ('viscous_friction',), {}),
+])  # fmt: skip
+def test_everyday_laws_stand_beside_a_force_of_known_shape(equations_for, gate, effects, standing):
+    """With their numbers there; none where the force and they leave much, or they say nothing."""
+
+    def force(_t, q, v):
+        return (-1.5 * math.tanh(3.0 * q[0]) - 0.3 * v[0],)
+
+    world = simulate(CHAINS[1], 9, 20.0, force=force, dry=lambda *_: 0.25)
+    searched, columns, scale = _shaped(equations_for(world)[1], gate, effects)
+    found = searched.everyday(columns, scale)
+    assert (found is None) is (not standing)
+    if not found:
+        return
+    model, std = found
+    assert {s.name for s in model.effects} == standing.keys()
+    assert std.keys() == model.key
+    for s in model.effects:
+        true = standing[s.name]
+        assert float(s.coefficients[0]) == pytest.approx(
+            true, abs=max(3.0 * std[s.key], 0.02 * true)
+        )
+    smooth = searched.smooth
+    gone = sum(f for s, f in zip(smooth.effects, smooth.forces, strict=True) if s.key not in std)
+    np.testing.assert_allclose(model.residual, smooth.residual + gone)
+
+
+@pytest.mark.parametrize(('gate', 'law', 'stands'), [
+    ('', 'coulomb_friction', True), ('sign', 'coulomb_friction', False),
+    ('sign', 'viscous_friction', True), ('speed', 'viscous_friction', False),
+    ('', 'spring', False),
+])  # fmt: skip
+def test_friction_does_not_stand_beside_a_form_of_itself(equations_for, gate, law, stands):
+    """Nor does any law that few joints have."""
+    _, equations = equations_for(simulate(CHAINS[1], 11, 3.0, force=_brake))
+    variable = Variable('q', 0, 'joint0')
+    smooth = SmoothForce(0, variable, gate, variable.knots(equations.motion, PIECES), 'joint0')
+    searched = Searched(0, None, None, (), np.zeros(0), 0.0)
+    effect = EFFECTS[law]
+    shape = effect.starts(equations.motion, Place(0))[0]
+    assert searched._may_stand(EffectAt(effect, Place(0), shape), smooth) is stands
+
+
 @pytest.mark.parametrize(('left', 'share', 'is_more'), [(0.9, 1.0, False), (1.1, 1.0, True),
                                                         (1.1, 0.5, False)])  # fmt: skip
 def test_a_formula_leaves_little_that_comes_back_with_the_motion(
     monkeypatch, left, share, is_more
 ):
     """Relative to its force; noise beside it may be larger."""
-    monkeypatch.setattr(assertion, 'repeatable', lambda *_: np.array([[share], [1.0]]))
+    monkeypatch.setattr(searched, 'repeatable', lambda *_: np.array([[share], [1.0]]))
     law, force = SimpleNamespace(place=Place(0)), np.full((5, 1), 2.0)
     model = SimpleNamespace(effects=(law,), forces=(force,), residual=None,
                             mean_square=np.array([4.0 * LAW_REST * left]))  # fmt: skip
     equations = SimpleNamespace(d=np.zeros((5, 1)))
-    assert assertion._leaves_more(equations, model, law) is is_more
+    assert leaves_more(equations, model, law) is is_more
 
 
 def test_what_is_unknown_at_two_joints_is_looked_for_beside_everyday_laws(equations_for):
