@@ -27,30 +27,35 @@ def measured_noise(raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwi
     """Return the mean square of the noise that measured efforts have in the band, (k,)."""
     if motion.drive is not None or motion.is_static:
         return np.zeros(motion.tree.size)
-    return effort_noise(motion.effort, raw.segments, raw.step, bandwidth.cutoff)
+    return effort_noise(motion.effort, raw.segments, raw.step, bandwidth.cutoff, raw.blur)
 
 
 def effort_noise(
-    effort: np.ndarray, segments: Sequence[slice], step: float, cutoff: float
+    effort: np.ndarray, segments: Sequence[slice], step: float, cutoff: float, blur: float = 0.0
 ) -> np.ndarray:
     """Return the mean square that noise of measured efforts may have below a cut-off, (k,).
 
     It is taken for white, at the lowest level that the spectra have in a quarter of the band
     above: motion, ripple and the noise of a current loop there are not noise of the measurement.
-    Two standard deviations of that level, and of the chance of so many rows, are added.
+    Two standard deviations of that level, and of the chance of so many rows, are added. Between
+    two samples with the weights 1 - a and a there is `1 - 2 a (1 - a) (1 - cos 2 pi f)` of the
+    power of noise of f periods of the samples: at a quarter of the rate as little as half of it.
 
     Args:
         effort: (n, k) [N m or N].
         segments: stretches of rows without a pause; the longest is looked at.
         step: of the grid [s].
         cutoff: [Hz].
+        blur: mean of `a (1 - a)`.
     """
     latest, highest = _EFFORTS
     edges = np.linspace(min(_ABOVE * cutoff * step, latest), highest, 5)
     rows = 2.0 * cutoff * step * sum(s.stop - s.start for s in segments)
     lines = (edges[1] - edges[0]) * max(s.stop - s.start for s in segments)
     chance = math.sqrt(2.0 / rows + _MEDIAN / lines)
-    level = spectral_levels(effort, segments, step, edges).min(axis=0)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    passed = 1.0 - 2.0 * blur * (1.0 - np.cos(2.0 * np.pi * middle))
+    level = (spectral_levels(effort, segments, step, edges) / passed[:, None]).min(axis=0)
     return np.asarray(cutoff * level * (1.0 + 2.0 * chance))
 
 

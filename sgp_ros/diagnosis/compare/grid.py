@@ -14,18 +14,21 @@ from sgp_ros.batch.acceptance import Accepted
 
 INSTANT_SPREAD = 12**-0.5
 """Prior standard deviation of the instant of a measured effort, in periods: uniform over one."""
+_COARSER = 1.5
+"""Steps of a grid, in those of the samples, from which it is coarser than these."""
 _POSITIONS = 0.3, 0.48
 """Frequencies at which no robot moves, in parts of the rate."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """The arrays of `RawTrajectory` for one stretch."""
+    """The arrays of `RawTrajectory` for one stretch, and its blur."""
 
     time: np.ndarray
     position: np.ndarray
     velocity: np.ndarray | None
     effort: np.ndarray | None
+    blur: float
 
     @classmethod
     def of(cls, accepted: Accepted, rows: np.ndarray, seconds: np.ndarray, step: float) -> Stretch:
@@ -50,11 +53,23 @@ class Stretch:
                 velocity = _lines(inner, known[has], accepted.velocity[rows][has])
         if accepted.is_measured[rows[0]]:
             effort = _lines(inner, known, accepted.effort[rows])
-        return cls(t, path(inner), velocity, effort)
+        return cls(t, path(inner), velocity, effort, _blur(inner, known))
 
 
 def _lines(t: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(t, known, column) for column in values.T])
+
+
+def _blur(t: np.ndarray, known: np.ndarray) -> float:
+    """Return the mean product of the weights of the two samples around each time, 0 to 1/4.
+
+    Of a coarser grid than that of the samples 0: noise above its band folds into it, and is white.
+    """
+    if t[-1] - t[0] > _COARSER * (known[-1] - known[0]) / len(known) * len(t):
+        return 0.0
+    after = np.clip(np.searchsorted(known, t, side='right'), 1, len(known) - 1)
+    part = np.clip((t - known[after - 1]) / (known[after] - known[after - 1]), 0.0, 1.0)
+    return float(np.mean(part * (1.0 - part)))
 
 
 def noise_density(position: np.ndarray, segments: Sequence[slice], step: float) -> np.ndarray:

@@ -109,7 +109,7 @@ def join(raws: Sequence[RawTrajectory]) -> RawTrajectory:
         first.start_ns, first.stated, tuple(dict.fromkeys(remarks)),
         recording=np.repeat(np.arange(len(raws)), np.diff(starts)),
         approach=_joined([raw.approach for raw in raws]),
-        gains=first.gains if is_driven else None,
+        gains=first.gains if is_driven else None, blur=float(np.mean([raw.blur for raw in raws])),
     )  # fmt: skip
 
 

@@ -62,6 +62,7 @@ def thinned(raw: RawTrajectory) -> RawTrajectory:
             slice(int(end) - len(part), int(end)) for end, part in zip(ends, parts, strict=True)
         ),
         recording=None if raw.recording is None else raw.recording[pick],
+        blur=raw.blur / every**2,
     )  # fmt: skip
 
 

@@ -61,6 +61,8 @@ class RawTrajectory:
         gains: of drives that hold position targets; None where commands are efforts.
         recording: (n,) index of the recording of each row, of several; None of one.
         approach: (n, k) direction from which each settled point was approached; None of motion.
+        blur: mean product of the weights of the two samples between which an effort lies, 0 to 1/4
+            of one period; see `effort_noise`.
     """
 
     time: np.ndarray
@@ -78,6 +80,7 @@ class RawTrajectory:
     gains: Gains | None = None
     recording: np.ndarray | None = None
     approach: np.ndarray | None = None
+    blur: float = 0.0
 
 
 def collect(
@@ -145,6 +148,7 @@ def collect(
         ),
         segments, dict(accepted.counts.refused), noise_density(position, segments, step),
         start_ns, stated, remarks, gains=None if drive is None else gains,
+        blur=float(np.mean([part.blur for part in parts])),
     )  # fmt: skip
 
 

@@ -32,6 +32,7 @@ PLACED = (
     f'(X - x0)*exp(-{_U}**2)', f'(X - x0)/(1 + {_U}**2)', f'(X - x0)/(1 + {_U}**2)**2',
     f'max(1 - {_U}**2, 0)', 'max(1 - abs(X - x0)/w0, 0)', 'min(max((X - x0)/w0, -1), 1)',
     'min(max((X - x0)/w0, 0), 1)', 'min(max((x0 - X)/w0, 0), 1)',
+    'min(max(w0 - abs(X - x0), 0)/w2, 1)', '(((o0 - X)/r)**(-p0) - ((X - u0)/r)**(-p0))',
     f'(1 + {_U}**2)**(-p0)', f'(X - x0)*(1 + {_U}**2)**(-p0)', f'sqrt(1 + {_U}**2)',
     f'(X - x0)/sqrt(1 + {_U}**2)', '(X - x0)/(1 + abs(X - x0)/w0)', 'log(1 + exp((X - x0)/w0))',
     'max(X - x0, 0)*exp(-(X - x0)/w0)', 'max(x0 - X, 0)*exp((X - x0)/w0)',
@@ -75,7 +76,7 @@ OF_FRICTION = (
 """Terms of the joint's own velocity that jump, or nearly so, at rest."""
 FACTORS = ('X', 'X**2', 'exp(X/w0)', 'exp(-X/w0)', 'tanh((X - x0)/w0)', f'exp(-{_U}**2)',
            'sin(n0*(X - x0))', f'1/(1 + {_U}**2)')  # fmt: skip
-_OWN = re.compile(r'\b([xwvnpoue])0\b')
+_OWN = re.compile(r'\b([xwvnpoue])([02])\b')
 
 
 def of_position() -> Iterator[str]:
@@ -130,4 +131,4 @@ def _with_constant(text: str) -> Iterator[str]:
 
 def _second(term: str) -> str:
     """Return a term whose parameters are not those of the first."""
-    return _OWN.sub(lambda m: f'{m[1]}1', term)
+    return _OWN.sub(lambda m: f'{m[1]}{int(m[2]) + 1}', term)

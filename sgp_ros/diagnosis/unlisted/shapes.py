@@ -40,7 +40,7 @@ GATES = ('', 'sign', 'soft', 'speed', 'square', 'effort')
 """Factors: 1, sign(v), tanh(v/v_s), v, |v| v, motor torque."""
 LAW = 'law'
 """Factor that is a formula, found before."""
-_NUMBERED = re.compile(r'(?<![\["])\b([xwvnpoue][01]|r|v_s|T|R)\b(?!["\]])')
+_NUMBERED = re.compile(r'(?<![\["])\b([xwvnpoue][0-3]|r|v_s|T|R)\b(?!["\]])')
 MORE_GATES = ('ahead', 'back', 'spin', 'place')
 """Factors that are tried where these leave something: v ahead, v back, v squared, q."""
 _TEXTS = {

@@ -11,6 +11,7 @@ import pytest
 from sgp_ros.diagnosis.compare.bandwidth import LOWEST_CUTOFF_HZ, choose_bandwidth
 from sgp_ros.diagnosis.compare.effort_noise import effort_noise, measured_noise, noise_beside_laws
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
+from sgp_ros.diagnosis.compare.thinning import thinned
 from sgp_ros.diagnosis.compare.trajectory import (
     HIGHEST_CUTOFF_HZ,
     SHORTEST_ROWS,
@@ -213,6 +214,24 @@ def test_the_noise_of_efforts_is_told_from_motion_and_ripple(cutoff):
     assert found.max() < 1.6
     (none,) = effort_noise(seen[:, None], [slice(0, n)], step, cutoff)
     assert none < 0.01 * in_band
+
+
+@pytest.mark.parametrize('every', [1, 2])
+@pytest.mark.parametrize(('jitter', 'late'), [(0.0, 0.0), (0.3, 0.0), (0.0, 0.5)])
+def test_noise_of_efforts_between_samples_is_as_large_as_at_them(robots, jitter, late, every):
+    """Stamps that jitter, or come late after a while, blur it where it is looked for."""
+    rng, rate, sigma = np.random.default_rng(4), 200.0 * every, 0.02
+    n = int(60.0 * rate)
+    t = (np.arange(n) + rng.uniform(-jitter, jitter, n) + late * (np.arange(n) > n // 3)) / rate
+    q = 0.8 * np.sin(2.0 * np.pi * 0.4 * t)
+    effort = 1.5 * np.cos(2.0 * np.pi * 0.4 * t) + sigma * rng.standard_normal(n)
+    names = robots[1][0].joint_names
+    events = [JointSample(round(1e9 * x), names, np.array([a]), None, np.array([b]))
+              for x, a, b in zip(t, q, effort, strict=True)]  # fmt: skip
+    raw = thinned(collect(events, robots[1][0]))
+    (found,) = effort_noise(raw.effort, raw.segments, raw.step, 8.0, raw.blur)
+    assert found / (2.0 * sigma**2 / rate * 8.0) == pytest.approx(1.1, abs=0.25)
+    assert (raw.blur > 0.01) is (jitter + late > 0.0)
 
 
 @pytest.mark.parametrize('level', [0.0, 0.5])

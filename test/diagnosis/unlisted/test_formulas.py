@@ -13,7 +13,7 @@ from sgp_ros.diagnosis.unlisted.assertion import with_laws
 from sgp_ros.diagnosis.unlisted.beside import law_of
 from sgp_ros.diagnosis.unlisted.curves import Curve, follow, hats, left_out
 from sgp_ros.diagnosis.unlisted.formulas import Range
-from sgp_ros.diagnosis.unlisted.sentences import of_position, of_velocity
+from sgp_ros.diagnosis.unlisted.sentences import of_position, of_velocity, sums
 from sgp_ros.physics.formula import read_formula
 from test.diagnosis.worlds import CHAINS, simulate
 
@@ -205,10 +205,21 @@ def test_a_gate_of_a_fiftieth_of_the_range_has_a_width():
         ('a*X**2/(1 + (X/v0)**2)', {'v0': 0.6}),
         ('a*max(tanh(X/v0), 0)', {'v0': 0.15}),
         ('a*min(tanh(X/v0), 0)', {'v0': 0.15}),
+        ('a*X*tanh((abs(X) - v0)/w0)', {'v0': 0.4, 'w0': 0.1}),
+        ('a*tanh((abs(X) - v0)/w0)', {'v0': 0.4, 'w0': 0.1}),
+        ('a*max(1 - (X/v0)**2, 0)*sign(X)', {'v0': 0.6}),
+        ('a*min(max(w0 - abs(X - x0), 0)/w2, 1)', {'x0': 0.1, 'w0': 0.5, 'w2': 0.15}),
+        (
+            'a*(((o0 - X)/r)**(-p0) - ((X - u0)/r)**(-p0))',
+            {'o0': 1.3, 'u0': -1.4, 'p0': 2.0, 'r': 1.0},
+        ),
     ],
 )
 def test_a_text_follows_its_own_curve(text, numbers):
-    """Half waves, poles of magnets, fields of coils, thresholds and saturated squares of speed."""
+    """Half waves, poles of magnets, fields of coils, thresholds and saturated squares of speed.
+
+    And friction of a part of the speeds, a force within an interval, one that grows at both ends.
+    """
     seen, nodes = Range(-1.0, 1.0, 'rad'), np.linspace(-1.0, 1.0, 101)
     is_speed = 'v0' in numbers
     assert text in set(of_velocity(is_own=True) if is_speed else of_position())
@@ -261,6 +272,15 @@ def test_a_force_between_nodes_is_judged_on_parts_left_out():
     assert left @ left < 0.2 * (wave @ wave)
     nowhere = left_out(hats(nodes + 7.0, lambda force: force, rest)[:, 1:], wave, part)
     assert nowhere == pytest.approx(wave)
+
+
+def test_a_second_term_has_parameters_of_its_own():
+    """Of a force within an interval, too, which has two widths."""
+    term = 'a*min(max(w0 - abs(X - x0), 0)/w2, 1)'
+    assert 'a*tanh((X - x0)/w0) + b*min(max(w1 - abs(X - x1), 0)/w3, 1)' in set(
+        sums('a*tanh((X - x0)/w0)', is_position=True)
+    )
+    assert all(' + b*' in text for text in sums(term, is_position=True))
 
 
 def test_texts_are_told_apart():
