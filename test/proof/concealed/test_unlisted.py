@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import sys
@@ -432,6 +433,19 @@ def test_a_set_is_measured_by_what_plain_effects_leave(monkeypatch, formula, low
         true=SimpleNamespace(mechanism=None), bodies=[SimpleNamespace(is_driven=True)]
     )
     assert low <= sizes.beyond_plain(motion, world, 0) <= high
+
+
+def test_the_last_digits_of_an_answer_are_not_sealed(tmp_path):
+    """Another processor draws the same world with others."""
+    hashes = []
+    for number, share in enumerate((0.31234567890123, 0.31234567890124, 0.3223)):
+        answer = tmp_path / f'{number}.json'
+        answer.write_text(json.dumps({'share': share, 'joints': ['elbow']}), encoding='utf-8')
+        hashes.append(unlisted.hash_of(answer))
+        assert unlisted._is_sealed(answer, {answer.stem: hashes[0]}) is (number < 2)
+        whole = hashlib.sha256(answer.read_bytes()).hexdigest()
+        assert unlisted._is_sealed(answer, {answer.stem: whole})
+    assert hashes[0] == hashes[1] != hashes[2]
 
 
 def test_another_answer_than_the_sealed_one_is_refused(tmp_path, monkeypatch):
