@@ -27,6 +27,7 @@ import numpy as np
 from sgp_proof.concealed import eighth_families as eighth
 from sgp_proof.concealed import fifth_families as fifth
 from sgp_proof.concealed import fourth_families as fourth
+from sgp_proof.concealed import ninth_families as ninth
 from sgp_proof.concealed import second_families as second
 from sgp_proof.concealed import seventh_families as seventh
 from sgp_proof.concealed import sixth_families as sixth
@@ -87,14 +88,13 @@ FAMILIES = {
     'walk': _walk,
 }
 """Name to force over its size. The last is no function of the motion: nothing is to be found."""
-SECOND_FROM, THIRD_FROM, FOURTH_FROM, FIFTH_FROM, SIXTH_FROM, SEVENTH_FROM, EIGHTH_FROM = (
-    20_000, 40_000, 60_000, 70_000, 80_000, 90_000, 100_000,
-)  # fmt: skip
+SECOND_FROM, THIRD_FROM, FOURTH_FROM, FIFTH_FROM = 20_000, 40_000, 60_000, 70_000
+SIXTH_FROM, SEVENTH_FROM, EIGHTH_FROM, NINTH_FROM = 80_000, 90_000, 100_000, 110_000
 """Seeds from here on conceal a law of the second set, of the third, and so on."""
-_LATER = eighth, seventh, sixth, fifth, fourth, third
-_LATER_FROM = EIGHTH_FROM, SEVENTH_FROM, SIXTH_FROM, FIFTH_FROM, FOURTH_FROM, THIRD_FROM
+_LATER = ninth, eighth, seventh, sixth, fifth, fourth, third
+_FROM = NINTH_FROM, EIGHTH_FROM, SEVENTH_FROM, SIXTH_FROM, FIFTH_FROM, FOURTH_FROM, THIRD_FROM
 _SETS = (
-    *((begin, x.FAMILIES, '') for begin, x in zip(_LATER_FROM, _LATER, strict=True)),
+    *((begin, x.FAMILIES, '') for begin, x in zip(_FROM, _LATER, strict=True)),
     (SECOND_FROM, second.FAMILIES, 'air_spring'),
     (0, FAMILIES, 'gas_spring'),
 )

@@ -14,6 +14,7 @@ import pytest
 from sgp_proof.concealed import eighth_families as eighth
 from sgp_proof.concealed import fifth_families as fifth
 from sgp_proof.concealed import fourth_families as fourth
+from sgp_proof.concealed import ninth_families as ninth
 from sgp_proof.concealed import second_families as second
 from sgp_proof.concealed import seventh_families as seventh
 from sgp_proof.concealed import sixth_families as sixth
@@ -26,6 +27,7 @@ from sgp_proof.concealed.unlisted import (
     FAMILIES,
     FIFTH_FROM,
     FOURTH_FROM,
+    NINTH_FROM,
     SECOND_FROM,
     SEVENTH_FROM,
     SIXTH_FROM,
@@ -93,7 +95,7 @@ def test_the_second_set_is_apart_from_all_others():
     assert set(second.KNOWN_SHAPES) <= set(second.FAMILIES)
 
 
-LATER_SETS = third, fourth, fifth, sixth, seventh, eighth
+LATER_SETS = third, fourth, fifth, sixth, seventh, eighth, ninth
 LATER = {kind: law for x in LATER_SETS for kind, law in x.FAMILIES.items()}
 REMEMBER = [kind for x in LATER_SETS for kind in x.REMEMBER]
 EARLIER = set(FAMILIES) | set(second.FAMILIES) | set(UNKNOWN)
@@ -112,6 +114,7 @@ def _drawn(kind):
         (sixth.FAMILIES, SIXTH_FROM, EARLIER | (set(LATER) - set(sixth.FAMILIES))),
         (seventh.FAMILIES, SEVENTH_FROM, EARLIER | (set(LATER) - set(seventh.FAMILIES))),
         (eighth.FAMILIES, EIGHTH_FROM, EARLIER | (set(LATER) - set(eighth.FAMILIES))),
+        (ninth.FAMILIES, NINTH_FROM, EARLIER | (set(LATER) - set(ninth.FAMILIES))),
     ],
 )
 def test_a_later_set_is_apart_from_all_others(known, begin, earlier):
@@ -134,6 +137,7 @@ def test_a_later_set_is_apart_from_all_others(known, begin, earlier):
         (sixth, SIXTH_FROM),
         (seventh, SEVENTH_FROM),
         (eighth, EIGHTH_FROM),
+        (ninth, NINTH_FROM),
     ],
 )
 def test_a_later_set_has_its_seeds_in_order(known, begin):
@@ -258,6 +262,14 @@ def test_listed_friction_in_a_law_may_be_named_beside_the_rest(is_apart):
             'thickening_fluid', '-0.25*dq[elbow]*(1 + tanh((abs(dq[elbow])/1.5 - jam)/over))',
             lambda p: {'b': 0.5 * p['thin']},
         ),
+        (
+            'drag_crisis',
+            (
+                'drop*abs(dq[elbow])*dq[elbow]/9'
+                '*(1 + tanh((abs(dq[elbow])/1.5 - crisis)/over))'
+            ),
+            lambda _p: {'c': 0.5 / 1.5**2},
+        ),
     ],
 )  # fmt: skip
 def test_a_listed_part_may_be_named_beside_the_rest(kind, rest, parameters):
@@ -346,6 +358,18 @@ def test_every_listed_part_of_a_law_can_be_scored():
             'memory_wire', 'a*min(max((lag(dq[elbow]**2, T) - c)/d, 0), 1)',
             {'a': 0.75, 'T': 0.3, 'c': 0.6 * 1.5**2, 'd': 0.7 * 1.5**2},
         ),
+        (
+            'leaking_tappet', '-a*max(q[elbow] - lag(q[elbow], T) - c, 0)',
+            {'a': 1.5, 'T': 0.4, 'c': 0.15},
+        ),
+        (
+            'governor_behind_dashpot', '-a*dq[elbow]*max(lag(abs(dq[elbow]), T) - c, 0)',
+            {'a': 1.0 / 1.5**2, 'T': 0.5, 'c': 0.6 * 1.5},
+        ),
+        (
+            'sump_filling_slowly', '-a*dq[elbow]*max(lag(q[elbow], T) - c, 0)',
+            {'a': 1.25 / 1.5, 'T': 0.5, 'c': -0.1},
+        ),
     ],
 )  # fmt: skip
 def test_laws_that_remember_are_compared_along_a_motion(kind, formula, numbers):
@@ -354,7 +378,7 @@ def test_laws_that_remember_are_compared_along_a_motion(kind, formula, numbers):
               'stroke': 0.6, 'leak_s': 0.4, 'poles': 3.0, 'phase': 0.2,
               'follow_s': 0.5, 'oil_s': 0.6, 'swing': 2.0, 'lean': 0.3,
               'coil_s': 0.3, 'run_s': 0.5, 'trip': 0.3, 'ring_s': 0.3, 'fold': 2.4, 'warm': 0.6,
-              'over': 0.7, 'heat_s': 0.3}  # fmt: skip
+              'over': 0.7, 'heat_s': 0.3, 'lash': 0.15, 'grip': 0.6, 'level': -0.1}  # fmt: skip
     effect = {'joint': 'elbow', 'parameters': {**P, **chosen, 'kind': kind}}
     finding = {'formula': f'tau_x[elbow] = {formula}',
                'parameters': {name: {'value': x} for name, x in numbers.items()}}  # fmt: skip
