@@ -164,7 +164,8 @@ MOST_CERTAIN = 0.99
 DOUBTED = 0.4
 """Greatest probability where the final model is worse than a constant [1]. Convention.
 
-The same holds for a finding whose size may be zero.
+The same holds for a finding whose size may be zero, and for a law that few joints have where
+physics is left at its joint.
 """
 CARRIED_REST = 0.1
 """Largest rest of a model, as part of the discrepancy, where it was not fitted [1]. Convention.

@@ -18,13 +18,13 @@ the others worse.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import EVIDENCE, STRUCTURE_LEAST_SHARE
-from sgp_ros.diagnosis.decide.scale import Scale
+from sgp_ros.diagnosis.criteria import EVIDENCE, LEAST_SHARE, STRUCTURE_LEAST_SHARE
+from sgp_ros.diagnosis.decide.scale import Scale, beyond_noise
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model
@@ -90,6 +90,19 @@ def repeatable(equations: Equations, residual: np.ndarray, asked: np.ndarray) ->
         explained = np.array([motion, _by_past(equations, r)])
         found[:, j] = np.minimum(1.0, np.maximum(explained, 0.0) + 1.0 / np.sqrt(N))
     return found
+
+
+def physics_left(equations: Equations, model: Model, unknown: Collection[int]) -> np.ndarray:
+    """Return what a model leaves of the mean squared effort that counts as physics, (k,) shares.
+
+    It comes back with the motion; 0 where it does not, where it is less, and at unknown joints.
+    """
+    counts = beyond_noise(equations, model) > LEAST_SHARE
+    counts[list(unknown)] = False
+    if not counts.any():
+        return np.zeros(len(counts))
+    share = repeatable(equations, model.residual, counts)[0] * model.left
+    return np.where(counts & (share > LEAST_SHARE), share, 0.0)
 
 
 def _by_past(equations: Equations, r: np.ndarray) -> float:

@@ -7,10 +7,10 @@ from collections.abc import Collection, Iterator
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import EVIDENCE, LEAST_SHARE, PER_PARAMETER
-from sgp_ros.diagnosis.decide.cross_validation import repeatable, support
+from sgp_ros.diagnosis.criteria import EVIDENCE, PER_PARAMETER
+from sgp_ros.diagnosis.decide.cross_validation import physics_left, support
 from sgp_ros.diagnosis.decide.decision import Decision
-from sgp_ros.diagnosis.decide.scale import Scale, beyond_noise
+from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.credibility import is_sound
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
@@ -149,10 +149,8 @@ def left_remarks(equations: Equations, model: Model, unknown: Collection[int]) -
 
     It is small against what is named there, and comes back with the motion.
     """
-    counts = beyond_noise(equations, model) > LEAST_SHARE
-    counts[list(unknown)] = False
-    share = repeatable(equations, model.residual, counts)[0] * model.left
-    for j in np.flatnonzero(counts & (share > LEAST_SHARE)):
+    share = physics_left(equations, model, unknown)
+    for j in np.flatnonzero(share):
         yield (
             f'Of the mean squared effort of {equations.motion.tree.moving_names[j]}, '
             f'{100.0 * share[j]:.2g} % is left that comes back with the motion. That is little '

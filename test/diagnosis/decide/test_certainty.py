@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from copy import copy
 from dataclasses import replace
 from types import SimpleNamespace
@@ -116,8 +117,11 @@ def test_a_gain_beside_free_bodies_is_as_sure_as_the_worst_joint(equations_for, 
 
 
 @pytest.mark.parametrize(('gain', 'is_doubted'), [(0.5, False), (0.23, True)])
-def test_numbers_that_no_machine_has_are_doubted(equations_for, viscous, gain, is_doubted):
+def test_numbers_that_no_machine_has_are_doubted(
+    monkeypatch, equations_for, viscous, gain, is_doubted
+):
     """A torque constant that is half of what is stated happens; less than a quarter does not."""
+    monkeypatch.setattr(certainty, 'physics_left', lambda *_: np.zeros(1))
     _, equations = equations_for(viscous)
     model = with_coefficients(fitted(equations, 'torque_gain'), np.array([gain - 1.0]))
     comparison = _comparison(equations, model)
@@ -129,6 +133,29 @@ def test_numbers_that_no_machine_has_are_doubted(equations_for, viscous, gain, i
     chances = certainty.probabilities(equations, comparison, decision, contrasts)
     assert scale.counts(model)
     assert (chances.of(model, 0) <= DOUBTED) is is_doubted
+
+
+@pytest.mark.parametrize(('name', 'is_doubted'), [
+    ('quadratic_drag', (False, True)), ('viscous_friction', (False, False)),
+])  # fmt: skip
+def test_a_rare_law_beside_what_counts_as_physics_is_doubted(equations_for, name, is_doubted):
+    """A ripple that no law here describes may bend it; friction is there in any case."""
+    for ripple, expected in zip((0.0, 0.8), is_doubted, strict=True):
+        size = 1.5 if name == 'viscous_friction' else 0.2
+
+        def force(_t, q, v, size=size, ripple=ripple):
+            drag = v[0] if name == 'viscous_friction' else abs(v[0]) * v[0]
+            return (ripple * math.sin(5.0 * q[0]) - size * drag,)
+
+        _, equations = equations_for(simulate(CHAINS[1], 4, 10.0, force=force))
+        model = fitted(equations, name)
+        comparison = _comparison(equations, model)
+        decision = replace(
+            decide(equations, comparison), model=model, excess=np.zeros(1), unknown=()
+        )
+        contrasts = certainty.Contrasts(equations, model)
+        chances = certainty.probabilities(equations, comparison, decision, contrasts)
+        assert (chances.of(model, 0) <= DOUBTED) is expected
 
 
 def test_a_rotor_takes_the_place_of_a_gain_that_is_worth_as_much(equations_for):
