@@ -18,6 +18,7 @@ from sgp_ros.diagnosis.criteria import (
     SLIGHT_REST,
 )
 from sgp_ros.diagnosis.decide.certainty import Probabilities
+from sgp_ros.diagnosis.decide.cross_validation import physics_left
 from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision
 from sgp_ros.diagnosis.decide.differences import Several
 from sgp_ros.diagnosis.decide.everyday import widened
@@ -54,13 +55,12 @@ def asserted(
     for i in common:  # of everyday laws beside something unknown, whose only number is their size
         own = decision.standing.get(model.effects[i].key, 0.0)
         std[i].update(dict.fromkeys(std[i], own) if own else {})
-    findings = [
-        doubted_if_late(
-            doubted_if_none(_finding(decision, model, i, std[i], chances), model.effects[i]),
-            model.effects[i], equations.motion,
-        )
-        for i in common
-    ]  # fmt: skip
+    left, findings = physics_left(equations, model, decision.unknown), []
+    for i in common:
+        s = model.effects[i]
+        found = doubted_if_none(_finding(decision, model, i, std[i], chances), s)
+        found = doubted_if_late(found, s, equations.motion)
+        findings.append(doubted_beside(found, s, left))
     findings += [
         _unknown(equations, decision, j, remainders, chances, depends) for j in decision.unknown
     ]
@@ -145,6 +145,18 @@ def doubted_if_late(finding: Finding, effect: EffectAt, motion: ObservedMotion) 
     if not 0.0 < lag < motion.step:
         return finding
     why = f'a drive that acts on states {1e3 * lag:.2g} ms old would do the same'
+    return replace(finding, probability=min(finding.probability, DOUBTED), why=why)
+
+
+def doubted_beside(finding: Finding, effect: EffectAt, left: np.ndarray) -> Finding:
+    """Return a finding, doubted if physics is left (k,) at the joint of a law that few joints have.
+
+    Another law would explain that, and may hide in this one, whose form was not chosen.
+    """
+    law, joint = effect.effect, effect.place.joint
+    if law.is_usual or law.has_chosen_form or joint < 0 or not left[joint]:
+        return finding
+    why = 'what is left at its joint comes back with the motion, and counts as physics'
     return replace(finding, probability=min(finding.probability, DOUBTED), why=why)
 
 

@@ -25,7 +25,7 @@ from sgp_ros.diagnosis.criteria import (
     STANDING,
     TEMPER,
 )
-from sgp_ros.diagnosis.decide.cross_validation import physics_left, without
+from sgp_ros.diagnosis.decide.cross_validation import without
 from sgp_ros.diagnosis.decide.decision import UNKNOWN, Decision, calm
 from sgp_ros.diagnosis.decide.differences import Several
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
@@ -155,7 +155,7 @@ def probabilities(
     one. An effect is only as certain as its joint is well described; one that acts on all
     joints, as the worst of them; a gain, whose measure are bodies that may differ, as the
     worst joint, known or not, for bodies take up what is not known there. Unlikely numbers are
-    doubted, and so are laws that few joints have where physics is left at their joint.
+    doubted.
     """
     scale, asserted = Scale.of(equations, comparison), decision.model
     if any(s.effect.has_chosen_form for s in asserted.effects):
@@ -190,20 +190,10 @@ def probabilities(
             if model.is_free and s.effect.alike:
                 a = float(adequate.min())
             by_key[s.key] = by_key.get(s.key, 0.0) + float(p * a)
-    left = physics_left(equations, asserted, decision.unknown)
-    far = {s.key for s in asserted.effects if _is_far(s) or _leaves_physics(s, left)}
+    far = {s.key for s in asserted.effects if _is_far(s)}
     stated = {key: min(p, DOUBTED if key in far else MOST_CERTAIN) for key, p in by_key.items()}
     unknown = np.clip(decision.excess / (decision.excess + 1.0), 0.05, 0.97)
     return Probabilities(stated, unknown, scale)
-
-
-def _leaves_physics(s: EffectAt, left: np.ndarray) -> bool:
-    """Return whether a listed law that few joints have leaves at its joint what counts as physics.
-
-    Another law would explain that, and may hide in this one.
-    """
-    is_listed = not (s.effect.is_usual or s.effect.has_chosen_form)
-    return bool(is_listed and s.place.joint >= 0 and left[s.place.joint])
 
 
 def _is_far(s: EffectAt) -> bool:

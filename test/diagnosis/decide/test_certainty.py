@@ -25,6 +25,7 @@ from sgp_ros.diagnosis.decide.certainty import (
     rests_on,
     settled,
 )
+from sgp_ros.diagnosis.decide.cross_validation import physics_left
 from sgp_ros.diagnosis.decide.decision import UNKNOWN, decide
 from sgp_ros.diagnosis.decide.reasons import why_not
 from sgp_ros.diagnosis.decide.scale import Scale
@@ -32,7 +33,7 @@ from sgp_ros.diagnosis.decide.simpler import simpler
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.regression import Columns
-from sgp_ros.diagnosis.findings import doubted_if_late, doubted_if_none
+from sgp_ros.diagnosis.findings import doubted_beside, doubted_if_late, doubted_if_none
 from sgp_ros.diagnosis.result import Finding, Location, Parameter
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
@@ -117,11 +118,8 @@ def test_a_gain_beside_free_bodies_is_as_sure_as_the_worst_joint(equations_for, 
 
 
 @pytest.mark.parametrize(('gain', 'is_doubted'), [(0.5, False), (0.23, True)])
-def test_numbers_that_no_machine_has_are_doubted(
-    monkeypatch, equations_for, viscous, gain, is_doubted
-):
+def test_numbers_that_no_machine_has_are_doubted(equations_for, viscous, gain, is_doubted):
     """A torque constant that is half of what is stated happens; less than a quarter does not."""
-    monkeypatch.setattr(certainty, 'physics_left', lambda *_: np.zeros(1))
     _, equations = equations_for(viscous)
     model = with_coefficients(fitted(equations, 'torque_gain'), np.array([gain - 1.0]))
     comparison = _comparison(equations, model)
@@ -135,27 +133,28 @@ def test_numbers_that_no_machine_has_are_doubted(
     assert (chances.of(model, 0) <= DOUBTED) is is_doubted
 
 
-@pytest.mark.parametrize(('name', 'is_doubted'), [
-    ('quadratic_drag', (False, True)), ('viscous_friction', (False, False)),
+@pytest.mark.parametrize(('name', 'ripple', 'is_doubted'), [
+    ('quadratic_drag', 0.0, False), ('quadratic_drag', 0.8, True), ('viscous_friction', 0.8, False),
 ])  # fmt: skip
-def test_a_rare_law_beside_what_counts_as_physics_is_doubted(equations_for, name, is_doubted):
+def test_a_rare_law_beside_what_counts_as_physics_is_doubted(
+    equations_for, name, ripple, is_doubted
+):
     """A ripple that no law here describes may bend it; friction is there in any case."""
-    for ripple, expected in zip((0.0, 0.8), is_doubted, strict=True):
-        size = 1.5 if name == 'viscous_friction' else 0.2
 
-        def force(_t, q, v, size=size, ripple=ripple):
-            drag = v[0] if name == 'viscous_friction' else abs(v[0]) * v[0]
-            return (ripple * math.sin(5.0 * q[0]) - size * drag,)
+    def force(_t, q, v):
+        drag = 1.5 * v[0] if name == 'viscous_friction' else 0.2 * abs(v[0]) * v[0]
+        return (ripple * math.sin(5.0 * q[0]) - drag,)
 
-        _, equations = equations_for(simulate(CHAINS[1], 4, 10.0, force=force))
-        model = fitted(equations, name)
-        comparison = _comparison(equations, model)
-        decision = replace(
-            decide(equations, comparison), model=model, excess=np.zeros(1), unknown=()
-        )
-        contrasts = certainty.Contrasts(equations, model)
-        chances = certainty.probabilities(equations, comparison, decision, contrasts)
-        assert (chances.of(model, 0) <= DOUBTED) is expected
+    _, equations = equations_for(simulate(CHAINS[1], 4, 10.0, force=force))
+    model = fitted(equations, name)
+    left = physics_left(equations, model, ())
+    assert (left[0] > LEAST_SHARE) is (ripple > 0.0)
+    finding = Finding('joint0', name, {}, Location(), 9.0, 0.99, 0.9, '')
+    found = doubted_beside(finding, model.effects[0], left)
+    assert (found.probability == DOUBTED) is is_doubted
+    assert ('counts as physics' in found.why) is is_doubted
+    assert found is finding or is_doubted
+    assert physics_left(equations, model, (0,))[0] == 0.0
 
 
 def test_a_rotor_takes_the_place_of_a_gain_that_is_worth_as_much(equations_for):
