@@ -23,6 +23,10 @@ LISTED = {
 """Effects that may be named beside a law that contains them, to their force."""
 
 
+STEP_S = 0.005
+"""Step of a motion along which laws that remember are compared [s]."""
+
+
 def other_u(m, p):
     """Return the position of the source over half its width."""
     return float(m.position[p['source']]) / p['source_reach']
@@ -69,3 +73,27 @@ class FamilySet:
             return (Action(joint, **{place: of(law) for place, law in laws.items()}),)
 
         return build
+
+
+def _lag(_at, x, time_constant):
+    z, lag = np.array(x, dtype=np.float64), max(time_constant, 1e-9)
+    keep, behind = math.exp(-STEP_S / lag), np.diff(x) * lag / STEP_S  # joined by lines
+    for i in range(1, len(z)):
+        z[i] = x[i] - behind[i - 1] + (z[i - 1] - x[i - 1] + behind[i - 1]) * keep
+    return z
+
+
+def _play(_at, x, width):
+    z = np.array(x, dtype=np.float64)
+    for i in range(1, len(z)):
+        z[i] = min(max(z[i - 1], x[i] - 0.5 * width), x[i] + 0.5 * width)
+    return z
+
+
+def _delay(_at, x, delay):
+    t = STEP_S * np.arange(len(x))
+    return np.interp(t - delay, t, x)
+
+
+ALONG = {'lag': _lag, 'play': _play, 'delay': _delay}
+"""Functions that remember, along a motion in steps of `STEP_S`."""

@@ -32,7 +32,7 @@ from sgp_proof.concealed import second_families as second
 from sgp_proof.concealed import seventh_families as seventh
 from sgp_proof.concealed import sixth_families as sixth
 from sgp_proof.concealed import third_families as third
-from sgp_proof.concealed.family_set import LISTED
+from sgp_proof.concealed.family_set import ALONG, LISTED, STEP_S
 from sgp_proof.concealed.unknown import OF_TIME, force
 from sgp_proof.result_files import RESULTS, write_result
 from sgp_ros.physics.drawing import UnsuitableError
@@ -41,9 +41,9 @@ from sgp_ros.physics.formula import read_formula
 HASHES = RESULTS / 'unlisted_hashes.json'
 SAME = 0.02
 """Greatest error of a law that is the true one, relative, over the states of the joint."""
-STATES, STEP_S = 2000, 0.005
+STATES = 2000
 EFFORT = np.random.default_rng(1).normal(size=STATES)
-"""Steps of a motion along which laws that remember are compared [s]; efforts over the usual."""
+"""States at which laws are compared, and efforts over the usual."""
 FAILED = {'verdict': 'failed', 'findings': [], 'fit': {}}
 """Of a diagnosis that ended without an answer: a miss."""
 _REMEMBERS = re.compile(r'\b(lag|play|delay)\(').search
@@ -189,34 +189,13 @@ def law_error(effect, finding, beside=()):
         return lambda _at: of[names.index(joint)]
 
     numbers['t'] = STEP_S * np.arange(len(q[0]))
-    special = {'lag': _lag, 'play': _play, 'delay': _delay}.get
     found = formula.compiled(
-        lambda name: lambda _at: numbers[name], signal, lambda name, _signals: special(name)
+        lambda name: lambda _at: numbers[name], signal, lambda name, _signals: ALONG.get(name)
     )(None)
     for part in beside:
         values = {name: x['value'] for name, x in part['parameters'].items()}
         found = found + LISTED[part['effect']](q[0], v[0], values)
     return float(np.sqrt(np.mean((found - true) ** 2) / np.mean(true**2)))
-
-
-def _lag(_at, x, time_constant):
-    z, lag = np.array(x, dtype=np.float64), max(time_constant, 1e-9)
-    keep, behind = math.exp(-STEP_S / lag), np.diff(x) * lag / STEP_S  # joined by lines
-    for i in range(1, len(z)):
-        z[i] = x[i] - behind[i - 1] + (z[i - 1] - x[i - 1] + behind[i - 1]) * keep
-    return z
-
-
-def _play(_at, x, width):
-    z = np.array(x, dtype=np.float64)
-    for i in range(1, len(z)):
-        z[i] = min(max(z[i - 1], x[i] - 0.5 * width), x[i] + 0.5 * width)
-    return z
-
-
-def _delay(_at, x, delay):
-    t = STEP_S * np.arange(len(x))
-    return np.interp(t - delay, t, x)
 
 
 def score(answer, diagnosis):

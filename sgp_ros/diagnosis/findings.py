@@ -149,7 +149,7 @@ def doubted_if_late(finding: Finding, effect: EffectAt, motion: ObservedMotion) 
 
 
 def doubted_beside(finding: Finding, effect: EffectAt, left: np.ndarray) -> Finding:
-    """Return a finding, doubted if physics is left (k,) at the joint of a law that few joints have.
+    """Return a finding, doubted if physics is left (k,) at the joint of a rare law.
 
     Another law would explain that, and may hide in this one, whose form was not chosen.
     """

@@ -117,18 +117,17 @@ def collect(
     seconds = (accepted.stamps_ns - start_ns) * 1e-9
     measured = bool(accepted.is_measured.mean() > _COMMON_SHARE)
     stretches = [
-        rows
-        for rows in accepted.stretches(config.max_gap)
+        rows for rows in accepted.stretches(config.max_gap)
         if len(rows) >= SHORTEST_ROWS and accepted.is_measured[rows[0]] == measured
-    ]
+    ]  # fmt: skip
     if not stretches:
         raise RecordingError(
             f'{len(seconds)} states, nowhere {SHORTEST_ROWS} of them without a pause above '
             f'{config.max_gap:g} s',
             'at least a few seconds of motion', 'use a longer recording, or one without pauses',
         )  # fmt: skip
-    own_step = float(np.median(np.concatenate([np.diff(seconds[rows]) for rows in stretches])))
-    step = max(own_step, least_step)
+    steps = np.concatenate([np.diff(seconds[rows]) for rows in stretches])
+    step = max(float(np.median(steps)), least_step)
     parts = [Stretch.of(accepted, rows, seconds, step) for rows in stretches]
     ends = np.cumsum([len(part.time) for part in parts])
     segments = tuple(
@@ -147,7 +146,7 @@ def collect(
             tuple((float(part.time[0]), len(part.time)) for part in parts), step,
         ),
         segments, dict(accepted.counts.refused), noise_density(position, segments, step),
-        start_ns, stated, remarks, gains=None if drive is None else gains,
+        start_ns, stated, remarks, None if drive is None else gains,
         blur=float(np.mean([part.blur for part in parts])),
     )  # fmt: skip
 

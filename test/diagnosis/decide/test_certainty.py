@@ -134,7 +134,8 @@ def test_numbers_that_no_machine_has_are_doubted(equations_for, viscous, gain, i
 
 
 @pytest.mark.parametrize(('name', 'ripple', 'is_doubted'), [
-    ('quadratic_drag', 0.0, False), ('quadratic_drag', 0.8, True), ('viscous_friction', 0.8, False),
+    ('quadratic_drag', 0.0, False), ('quadratic_drag', 0.8, True),
+    ('viscous_friction', 0.8, False),
 ])  # fmt: skip
 def test_a_rare_law_beside_what_counts_as_physics_is_doubted(
     equations_for, name, ripple, is_doubted
@@ -148,7 +149,7 @@ def test_a_rare_law_beside_what_counts_as_physics_is_doubted(
     _, equations = equations_for(simulate(CHAINS[1], 4, 10.0, force=force))
     model = fitted(equations, name)
     left = physics_left(equations, model, ())
-    assert (left[0] > LEAST_SHARE) is (ripple > 0.0)
+    assert bool(left[0] > LEAST_SHARE) is (ripple > 0.0)
     finding = Finding('joint0', name, {}, Location(), 9.0, 0.99, 0.9, '')
     found = doubted_beside(finding, model.effects[0], left)
     assert (found.probability == DOUBTED) is is_doubted
