@@ -169,6 +169,8 @@ def equivalents(
 ) -> tuple[Equivalent, ...]:
     """Return what the recording cannot tell from the asserted model, best first.
 
+    Laws of a joint with something unknown were refused there; they are in place of nothing.
+
     Args:
         equations: of the recording.
         comparison: its models.
@@ -180,6 +182,7 @@ def equivalents(
     scale, best = Scale.of(equations, comparison), decision.model
     unlikely = _without_prior(equations, comparison.parameters)
     others = {*decision.rivals, comparison.nominal, comparison.parameters} - {best}
+    others = {m for m in others if not any(s.place.joint in decision.unknown for s in m.effects)}
     found: list[Equivalent] = []
     known: list[Model] = [best]
     least = scale.fit(best) - ALIKE

@@ -22,10 +22,10 @@ from test.diagnosis.fitted_models import fitted, with_coefficients
 from test.diagnosis.worlds import CHAINS, events_of, robot_of, simulate
 
 
-def _equivalents(equations, best, rivals):
+def _equivalents(equations, best, rivals, unknown=()):
     bases = fitted(equations), fitted(equations, is_free=True)
     comparison = Comparison(*bases, (best, *rivals), ())
-    decision = Decision('missing_physics', best, tuple(rivals), 0.0, 0)
+    decision = Decision('missing_physics', best, tuple(rivals), 0.0, 0, unknown)
     return equivalents(equations, comparison, decision, Contrasts(equations, best))
 
 
@@ -55,6 +55,17 @@ def test_what_contains_the_finding_is_no_other_explanation(narrow):
     spring, more = fitted(narrow, 'spring'), fitted(narrow, 'spring', 'viscous_friction')
     found = _equivalents(narrow, spring, [more, fitted(narrow, 'spring', is_free=True)])
     assert all(('joint0', 'spring') not in e.effects for e in found)
+
+
+def test_laws_that_were_refused_at_an_unknown_joint_are_in_place_of_nothing(narrow):
+    """Beside what stands there, which leaves the unknown, any of them fits better."""
+    rub, rivals = fitted(narrow, 'viscous_friction'), [fitted(narrow, 'spring')]
+    said = {
+        unknown: [e.effects for e in _equivalents(narrow, rub, rivals, unknown)]
+        for unknown in ((), (0,))
+    }
+    assert (('joint0', 'spring'),) in said[()]
+    assert (('joint0', 'spring'),) not in said[(0,)]
 
 
 def test_the_diagnosis_says_what_it_cannot_tell(robots):
