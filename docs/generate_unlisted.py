@@ -51,13 +51,18 @@ def text():
         **_no_law(), **_resonance('elastic', ELASTIC), **_resonance('mount', MOUNT),
         **known,
         terms=len(library(['a'])), baselines=_baselines(_cases(FOURTH)), **_sizes(result),
-        failures=_failures(rows), worlds=summary['worlds'],
+        failures=_failures(rows), wrong_error=_share(max(_errors(rows), default=0.0)), worlds=summary['worlds'],
         families=len({r['kind'] for r in rows}), found=_share(summary['found']),
         right=_share(summary['right_joint']), wrong=_share(summary['wrong_names']),
         unexplained=sum(r['verdict'] == 'unexplained' for r in rows if not r['found']),
         sealed=result['sealed'], table=_table(rows), machines=_machines(), upper=100.0 * (1.0 - 0.05 ** (1.0 / summary['worlds'])),
         seeds=f'{numbers[0]}:{numbers[0] + result["sealed"]}', least=100.0 * LEAST_LAW,
     )  # fmt: skip
+
+
+def _errors(rows):
+    """Return the errors of laws that are not the true ones, relative."""
+    return [e for r in rows if r['wrong'] for e in r['law_error'] if e is not None]
 
 
 def _cases(path):
