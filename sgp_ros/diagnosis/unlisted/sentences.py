@@ -62,6 +62,7 @@ OF_VELOCITY = (
     'min(X, 0)**2', 'a*max(X, 0)**2 + b*min(X, 0)**2', 'exp(X/v0)', 'exp(-X/v0)',
     'tanh((X - x0)/w0)', 'max(X - x0, 0)', 'max(x0 - X, 0)', 'X**2/(1 + (X/v0)**2)',
     'max(tanh(X/v0), 0)', 'min(tanh(X/v0), 0)', 'X*tanh((abs(X) - v0)/w0)',
+    'a*abs(X)*X + b*abs(X)*X*tanh((abs(X) - v0)/w0)',
 )  # fmt: skip
 """Terms of a velocity that begin at rest, or act as those do."""
 OF_SPEED = ('abs(X)', '(abs(X)/r)**p0', 'tanh(abs(X)/v0)', 'exp(-abs(X)/v0)', 'exp(-(X/v0)**2)',

@@ -264,11 +264,11 @@ def unlike(smooth: list[Model], joint: int) -> list[Model]:
 def beside_each(smooth: list[Model], joint: int) -> list[tuple[Model, SmoothForce]]:
     """Return the best model beside each choice of other effects; they come best first.
 
-    Left out are those of the joint's own speed, whose knots are dense where friction changes.
+    One with a force of the joint's own speed, and one with another force.
     """
     found: dict[object, tuple[Model, SmoothForce]] = {}
     for model in smooth:
         placed, force = smooth_of(model, joint)
-        if not force.is_of_own_speed:
-            found.setdefault(model.key - {placed.key}, (model, force))
+        beside = model.key - {placed.key}, force.is_of_own_speed
+        found.setdefault(beside, (model, force))
     return list(found.values())

@@ -347,7 +347,7 @@ def test_a_law_in_a_narrow_region_is_found_beside_friction(equations_for):
 
 
 def test_each_choice_of_listed_effects_gets_a_finer_spline(monkeypatch):
-    """The best beside each; none of the own speed, whose knots are dense already."""
+    """The best beside each, of the joint's own speed and of anything else."""
 
     def model(*listed, own_speed=False):
         force = SimpleNamespace(is_of_own_speed=own_speed)
@@ -357,8 +357,25 @@ def test_each_choice_of_listed_effects_gets_a_finer_spline(monkeypatch):
         shapes, 'smooth_of', lambda m, _joint: (SimpleNamespace(key='smooth'), m.force)
     )
     best, worse, other = model('gain'), model('gain'), model('friction')
-    found = shapes.beside_each([model('gain', own_speed=True), best, worse, other], 0)
-    assert found == [(best, best.force), (other, other.force)]
+    fast, slow = model('gain', own_speed=True), model('gain', own_speed=True)
+    found = shapes.beside_each([fast, best, worse, slow, other], 0)
+    assert found == [(m, m.force) for m in (fast, best, other)]
+
+
+def test_a_law_of_speed_that_a_coarse_spline_does_not_follow_is_found(equations_for):
+    """A motor on the mains pulls towards its own speed, and lets go of a joint that leaves it."""
+
+    def mains(_t, _q, v):
+        x = v[0] - 1.6
+        return (-4.0 * x / (1.0 + (x / 0.25) ** 2),)
+
+    _, equations = equations_for(simulate(CHAINS[1], 6, 20.0, force=mains))
+    comparison = compare_models(equations, lambda _share: None)
+    found = with_laws(equations, comparison, decide(equations, comparison)).decision.model
+    law, v = law_of(found, 0), equations.motion.velocity
+    assert law is not None
+    true = np.array([mains(0.0, None, x)[0] for x in v])
+    assert np.abs(law.force(equations.motion)[:, 0] - true).max() < 0.05 * np.abs(true).max()
 
 
 def test_a_finer_spline_has_columns_of_its_own(equations_for):
