@@ -372,7 +372,7 @@ def test_a_force_of_the_own_speed_gets_a_finer_spline(equations_for):
     _, equations = equations_for(simulate(CHAINS[1], 6, 10.0, force=mains))
     scale = Scale.of(equations, compare_models(equations, lambda _share: None)).of_forms()
     listed = fitted(equations, 'viscous_friction')
-    found = searching._Look(Columns(equations), scale, listed, 0, True).ranked()
+    found = searching._Look(Columns(equations), scale, listed, 0, is_open=True).ranked()
     fine = [m for m in found if len(shapes.smooth_of(m, 0)[1].linear) == FINE + 3]
     assert any(shapes.smooth_of(m, 0)[1].is_of_own_speed for m in fine)
 
