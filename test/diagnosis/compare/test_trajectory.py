@@ -11,7 +11,7 @@ import pytest
 from sgp_ros.diagnosis.compare.bandwidth import LOWEST_CUTOFF_HZ, choose_bandwidth
 from sgp_ros.diagnosis.compare.effort_noise import effort_noise, measured_noise, noise_beside_laws
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
-from sgp_ros.diagnosis.compare.thinning import thinned
+from sgp_ros.diagnosis.compare.thinning import every_row_needed, thinned
 from sgp_ros.diagnosis.compare.trajectory import (
     HIGHEST_CUTOFF_HZ,
     SHORTEST_ROWS,
@@ -216,7 +216,7 @@ def test_the_noise_of_efforts_is_told_from_motion_and_ripple(cutoff):
     assert none < 0.01 * in_band
 
 
-@pytest.mark.parametrize('every', [1, 2])
+@pytest.mark.parametrize('every', [1, 3])
 @pytest.mark.parametrize(('jitter', 'late'), [(0.0, 0.0), (0.3, 0.0), (0.0, 0.5)])
 def test_noise_of_efforts_between_samples_is_as_large_as_at_them(robots, jitter, late, every):
     """Stamps that jitter, or come late after a while, blur it where it is looked for."""
@@ -228,7 +228,12 @@ def test_noise_of_efforts_between_samples_is_as_large_as_at_them(robots, jitter,
     names = robots[1][0].joint_names
     events = [JointSample(round(1e9 * x), names, np.array([a]), None, np.array([b]))
               for x, a, b in zip(t, q, effort, strict=True)]  # fmt: skip
-    raw = thinned(collect(events, robots[1][0]))
+    raw = collect(events, robots[1][0])
+    fewer = every_row_needed(raw)
+    assert (fewer > 1) is (every > 1)
+    assert thinned(raw).blur == raw.blur / fewer**2
+    assert collect(events, robots[1][0], least_step=2.0 / rate).blur == 0.0  # noise folds there
+    raw = thinned(raw)
     (found,) = effort_noise(raw.effort, raw.segments, raw.step, 8.0, raw.blur)
     assert found / (2.0 * sigma**2 / rate * 8.0) == pytest.approx(1.1, abs=0.25)
     assert (raw.blur > 0.01) is (jitter + late > 0.0)

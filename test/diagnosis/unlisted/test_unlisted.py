@@ -13,6 +13,7 @@ import pytest
 from sgp_ros.diagnosis.criteria import (
     ALIKE,
     COUNTED_SHARE,
+    INTERVAL,
     LACKING,
     LAW_REST,
     SIGNIFICANT,
@@ -576,11 +577,11 @@ def test_laws_of_two_joints_are_found_together(equations_for):
         np.testing.assert_allclose(law.force(motion)[:, joint], expected, atol=0.02)
 
 
-def _shaped(equations, gate, effects):
+def _shaped(equations, effects):
     """Return a search that ended with a force of the position, and its columns and scale."""
     columns, motion = Columns(equations), equations.motion
     variable = Variable('q', 0, 'joint0')
-    smooth = SmoothForce(0, variable, gate, variable.knots(motion, FINE), 'joint0')
+    smooth = SmoothForce(0, variable, '', variable.knots(motion, FINE), 'joint0')
     laws = [EffectAt(EFFECTS[name], Place(0)) for name in effects]
     sigma = fitted(equations).sigma
     model = fit(columns, (EffectAt(smooth, Place(0), np.zeros(0)), *laws), sigma, is_free=False)
@@ -588,36 +589,62 @@ def _shaped(equations, gate, effects):
     return Searched(0, model, model, (), np.zeros(0), 0.0), columns, scale
 
 
-@pytest.mark.parametrize(('gate', 'effects', 'standing'), [
-    ('', ('viscous_friction', 'coulomb_friction'), {'viscous_friction': 0.3,
-                                                    'coulomb_friction': 0.25}),
-    ('', ('viscous_friction', 'armature', 'coulomb_friction'), {'viscous_friction': 0.3,
-                                                                'coulomb_friction': 0.25}),
-    ('', ('viscous_friction',), {}),
-])  # fmt: skip
-def test_everyday_laws_stand_beside_a_force_of_known_shape(equations_for, gate, effects, standing):
-    """With their numbers there; none where the force and they leave much, or they say nothing."""
+def _sprung(damping=0.3):
+    """Return a world with a spring that saturates, and friction."""
 
     def force(_t, q, v):
-        return (-1.5 * math.tanh(3.0 * q[0]) - 0.3 * v[0],)
+        return (-1.5 * math.tanh(3.0 * q[0]) - damping * v[0],)
 
-    world = simulate(CHAINS[1], 9, 20.0, force=force, dry=lambda *_: 0.25)
-    searched, columns, scale = _shaped(equations_for(world)[1], gate, effects)
+    return simulate(CHAINS[1], 9, 20.0, force=force, dry=lambda *_: 0.25)
+
+
+_RUBBED = 'viscous_friction', 'coulomb_friction'
+
+
+@pytest.mark.parametrize(('damping', 'effects', 'standing'), [
+    (0.3, _RUBBED, _RUBBED), (0.3, (*_RUBBED, 'armature'), _RUBBED),
+    (0.01, _RUBBED, _RUBBED[1:]), (0.3, _RUBBED[:1], ()),
+])  # fmt: skip
+def test_everyday_laws_stand_beside_a_force_of_known_shape(
+    equations_for, damping, effects, standing
+):
+    """With their numbers there; none where the force and they leave much, or they say nothing."""
+    searched, columns, scale = _shaped(equations_for(_sprung(damping))[1], effects)
     found = searched.everyday(columns, scale)
     assert (found is None) is (not standing)
     if not found:
         return
     model, std = found
-    assert {s.name for s in model.effects} == standing.keys()
+    assert {s.name for s in model.effects} == {*standing}
     assert std.keys() == model.key
     for s in model.effects:
-        true = standing[s.name]
-        assert float(s.coefficients[0]) == pytest.approx(
-            true, abs=max(3.0 * std[s.key], 0.02 * true)
-        )
+        true = {'viscous_friction': damping, 'coulomb_friction': 0.25}[s.name]
+        close = max(3.0 * std[s.key], 0.02 * true)
+        assert float(s.coefficients[0]) == pytest.approx(true, abs=close)
     smooth = searched.smooth
     gone = sum(f for s, f in zip(smooth.effects, smooth.forces, strict=True) if s.key not in std)
     np.testing.assert_allclose(model.residual, smooth.residual + gone)
+
+
+@pytest.mark.parametrize(('worth_without', 'is_in_rival', 'stands'), [
+    (0.0, True, True), (0.0, False, False), (2.0, True, False),
+])  # fmt: skip
+def test_an_everyday_law_is_worth_its_price_beside_every_formula(
+    equations_for, worth_without, is_in_rival, stands
+):
+    """Its interval holds the numbers that it has beside formulas that are worth as much."""
+    searched, columns, _ = _shaped(equations_for(_sprung())[1], _RUBBED)
+    model = searched.smooth
+    rub = next(s for s in model.effects if s.name == 'viscous_friction')
+    other = replace(rub, coefficients=1.1 * rub.coefficients)
+    effects = tuple(other if s is rub else s for s in model.effects if s is not rub or is_in_rival)
+    rival = replace(model, effects=effects)
+    searched = replace(searched, laws=(rival,))
+    scale = SimpleNamespace(worth=lambda m: 1.0 if m in (model, rival) else worth_without)
+    _, std = searched.everyday(columns, scale) or (None, {})
+    assert (rub.key in std) is stands
+    if stands:
+        assert std[rub.key] == pytest.approx(0.1 * float(rub.coefficients[0]) / INTERVAL)
 
 
 @pytest.mark.parametrize(('gate', 'law', 'stands'), [
