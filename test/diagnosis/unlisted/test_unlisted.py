@@ -626,6 +626,15 @@ def test_everyday_laws_stand_beside_a_force_of_known_shape(
     np.testing.assert_allclose(model.residual, smooth.residual + gone)
 
 
+def test_an_everyday_law_that_does_not_count_as_physics_is_not_told(monkeypatch, equations_for):
+    """However small what is left beside it."""
+    found, columns, scale = _shaped(equations_for(_sprung())[1], _RUBBED)
+    share = max(x for s, x in zip(found.smooth.effects, found.smooth.filtered_shares, strict=True)
+                if s.name in _RUBBED)  # fmt: skip
+    monkeypatch.setattr(searched, 'COUNTED_SHARE', 1.1 * share)
+    assert found.everyday(columns, scale) is None
+
+
 @pytest.mark.parametrize(('worth_without', 'is_in_rival', 'stands'), [
     (0.0, True, True), (0.0, False, False), (2.0, True, False),
 ])  # fmt: skip
