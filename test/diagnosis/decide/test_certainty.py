@@ -33,7 +33,7 @@ from sgp_ros.diagnosis.decide.simpler import simpler
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.regression import Columns
-from sgp_ros.diagnosis.findings import doubted_beside, doubted_if_late, doubted_if_none
+from sgp_ros.diagnosis.findings import asserted, doubted_beside, doubted_if_late, doubted_if_none
 from sgp_ros.diagnosis.result import Finding, Location, Parameter
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
@@ -156,6 +156,11 @@ def test_a_rare_law_beside_what_counts_as_physics_is_doubted(
     assert ('counts as physics' in found.why) is is_doubted
     assert found is finding or is_doubted
     assert physics_left(equations, model, (0,))[0] == 0.0
+    comparison = _comparison(equations, model)
+    decision = replace(decide(equations, comparison), model=model, excess=np.zeros(1), unknown=())
+    chances = Probabilities({s.key: 0.99 for s in model.effects}, np.zeros(1), None)
+    (said,), _ = asserted(equations, decision, (), (), chances, ())
+    assert ('counts as physics' in said.why) is is_doubted
 
 
 def test_a_rotor_takes_the_place_of_a_gain_that_is_worth_as_much(equations_for):

@@ -626,6 +626,18 @@ def test_everyday_laws_stand_beside_a_force_of_known_shape(
     np.testing.assert_allclose(model.residual, smooth.residual + gone)
 
 
+def test_what_stands_beside_a_refused_formula_is_part_of_the_decision(monkeypatch, equations_for):
+    """With the model that it was fitted in."""
+    _, equations = equations_for(_sprung())
+    comparison = compare_models(equations, lambda _share: None)
+    monkeypatch.setattr(assertion, '_objection', lambda *_: 'it is not asked for')
+    found = with_laws(equations, comparison, decide(equations, comparison))
+    assert found.decision.unknown == (0,)
+    model, std = found.decision.shaped[0]
+    assert {s.name for s in model.effects} == {*_RUBBED}
+    assert std.keys() == model.key
+
+
 def test_an_everyday_law_that_does_not_count_as_physics_is_not_told(monkeypatch, equations_for):
     """However small what is left beside it."""
     found, columns, scale = _shaped(equations_for(_sprung())[1], _RUBBED)
