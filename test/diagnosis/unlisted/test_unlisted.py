@@ -25,7 +25,7 @@ from sgp_ros.diagnosis.explain.comparison import compare_models
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.mapping import diagnosis_mapping
 from sgp_ros.diagnosis.pipeline import diagnose
-from sgp_ros.diagnosis.unlisted import assertion, searched, shapes, tried
+from sgp_ros.diagnosis.unlisted import assertion, searched, shapes, statement, tried
 from sgp_ros.diagnosis.unlisted import search as searching
 from sgp_ros.diagnosis.unlisted.assertion import _in_plain_laws, with_laws
 from sgp_ros.diagnosis.unlisted.beside import earned, is_bent, law_of, refined
@@ -449,6 +449,27 @@ def test_every_formula_has_the_unit_of_a_force(equations_for, perfect):
     assert {kind for _, kind, _ in seen} == {'q', 'dq', 'tau'}
     assert {gate for gate, of, *_ in more if of[0] == 0} == {'speed', 'effort'}
     assert ('', 'q', 0) in seen
+
+
+@pytest.mark.parametrize('memory', [('lead', 0.3), ('stretch', 0.2), ('slip', 0.3)])
+def test_a_formula_is_drawn_beyond_what_was_seen_over_its_own_variable(equations_for, memory):
+    """A lead as that of a joint at rest, a stretch or slip as what it is ahead of zero."""
+    _, equations = equations_for(simulate(CHAINS[1], 11, 3.0, force=_brake))
+    columns, motion = Columns(equations), equations.motion
+    variable = Variable('q', 0, 'joint0', memory=memory)
+    smooth = SmoothForce(0, variable, '', variable.knots(motion, PIECES), 'joint0')
+    seen = Range.of_variable(variable, motion)
+    law = a_law(smooth, motion, seen, 'a*tanh(X/v0)', {'v0': 0.5})
+    sigma = fitted(equations).sigma
+    shape = np.array([memory[1]])
+    model = fit(columns, (EffectAt(smooth, Place(0), shape),), sigma, is_free=False, still=1)
+    numbers = {'T': memory[1], 'v0': 0.5}
+    placed = EffectAt(
+        law, Place(0), np.array([numbers[n] for n in law.shape_names()]), np.array([2.0])
+    )
+    x = np.linspace(-3.0, 3.0, 7)
+    found = statement._beyond(placed, Searched(0, model, model, (), np.zeros(0), 0.0), x)
+    np.testing.assert_allclose(found, 2.0 * np.tanh(x / 0.5))
 
 
 @pytest.mark.parametrize(('worth', 'kept'), [(5.0, 'bc'), (5.0 + 2.0 * ALIKE, 'abc')])
