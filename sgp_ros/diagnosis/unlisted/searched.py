@@ -65,8 +65,8 @@ class Searched:
     def everyday(self, columns: Columns, scale: Scale) -> tuple[Model, dict[object, float]] | None:
         """Return a model without the smooth force, with the everyday laws that stand beside it.
 
-        Their numbers are those beside that force, and counted are they only if each is worth its
-        price there and counts as physics. The standard deviations, by the keys of the laws, hold
+        Their numbers are those beside that force. Each is worth its price there and counts as
+        physics. The standard deviations, by the keys of the laws, hold
         the numbers beside every formula that is worth as much. None where there is no such law,
         where more is left than may be beside it, or where the force may be friction itself.
 
@@ -77,14 +77,18 @@ class Searched:
         model, (placed, force) = self.smooth, smooth_of(self.smooth, self.joint)
         if force.variable.index == self.joint and force.variable.kind == 'dq':
             return None
-        std = [*map(dict.values, reported_std(model, columns))]
+        may = [
+            s for s, share in zip(model.effects, model.filtered_shares, strict=True)
+            if self._may_stand(s, force) and share >= COUNTED_SHARE
+            and not leaves_more(model.frame.equations, model, s)
+        ]  # fmt: skip
+        if not may:
+            return None
+        known = zip(model.effects, reported_std(model, columns), strict=True)
+        std = {s: tuple(x.values()) for s, x in known if s in may}
         rivals = [m for m in self.laws if scale.worth(m) >= scale.worth(model)]
         found: dict[object, float] = {}
-        for s, share, (*spread,) in zip(model.effects, model.filtered_shares, std, strict=True):
-            if not self._may_stand(s, force) or share < COUNTED_SHARE:
-                continue
-            if leaves_more(model.frame.equations, model, s):
-                continue
+        for s, spread in std.items():
             others = tuple(o for o in model.effects if o is not s)
             without = fit(columns, others, model.sigma, is_free=model.is_free, w=model.w,
                           still=len(others))  # fmt: skip
