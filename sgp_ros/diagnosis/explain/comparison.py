@@ -50,12 +50,7 @@ class Comparison:
     @property
     def is_calm(self) -> bool:
         """Whether likely bodies leave too little for any effect."""
-        return self.leaves_nothing and self.base.strain < PER_EFFECT
-
-    @property
-    def leaves_nothing(self) -> bool:
-        """Whether bodies, likely or not, leave too little for any effect."""
-        return bool(self.base.left.max() < SLIGHT_REST)
+        return bool(self.base.left.max() < SLIGHT_REST and self.base.strain < PER_EFFECT)
 
 
 def compare_models(equations: Equations, progress: Callable[[float], None]) -> Comparison:
@@ -63,8 +58,7 @@ def compare_models(equations: Equations, progress: Callable[[float], None]) -> C
 
     Every model comes in two variants: with bodies as the nominal robot has them, and with bodies
     that may differ. The freedom of the second has its price in evidence. Where bodies leave too
-    little for any effect, none is looked for but what would explain the same as other bodies; and
-    where these are unlikely, a second one only beside those of the robot file.
+    little for any effect, none is looked for but what would explain the same as other bodies.
     """
     columns = Columns(equations)
     start = first_scale(equations)
@@ -82,7 +76,6 @@ def compare_models(equations: Equations, progress: Callable[[float], None]) -> C
     singles = ranked(singles)
     pairs: list[Model] = []
     parents, effects = _varied(singles), tuple(equations.motion.catalogue.values())
-    parents = [m for m in parents if not (m.is_free and plain.leaves_nothing)]
     for number, single in enumerate(parents):
         second = _distinct(screen(columns, single, effects), SECOND)
         pairs += _fitted(columns, single, [(*single.effects, s) for s in second], MOST_PAIRS)
