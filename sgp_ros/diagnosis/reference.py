@@ -77,8 +77,9 @@ def against_simulation(
     shared: list[Finding] = []
     for here, of_here in real.estimates(ours).values():
         there, of_there = known[here.key]
-        finding = _compared(here, there, (of_here, of_there), equations)
-        if here.key not in named:
+        is_known = here.key in named
+        finding = _compared(here, there, (of_here, of_there), equations, is_in_simulation=is_known)
+        if not is_known:
             finding = _sized(finding, here)
         force = (
             here.columns(equations.motion) @ here.coefficients
@@ -232,10 +233,21 @@ def _moving_power(equations: Equations) -> np.ndarray:
     return np.where(driven & (moving > 0.0), np.minimum(moving, equations.power), equations.power)
 
 
+def _evidence_of_any(law: EffectAt, numbers: Mapping[str, Parameter]) -> float:
+    """Return by how much the sizes of a law speak against its absence [nats]."""
+    known = [(q.neutral, numbers[q.name]) for q in law.sizes if q.name in numbers]
+    away = [abs(float(p.value) - none) / p.std for none, p in known if p.std]
+    return 0.5 * max(away, default=math.inf) ** 2
+
+
 def _compared(
-    here: EffectAt, there: EffectAt, std: tuple[Mapping[str, float], ...], equations: Equations
-) -> Finding:
-    """Return an effect with its numbers on both sides, and the probability that they differ."""
+    here: EffectAt, there: EffectAt, std: tuple[Mapping[str, float], ...], equations: Equations,
+    *, is_in_simulation: bool = True,
+) -> Finding:  # fmt: skip
+    """Return an effect with its numbers on both sides, and the probability that they differ.
+
+    Where a simulation is explained without it, none there is as likely as the same is.
+    """
     motion = equations.motion
     ours, theirs = (
         stated_parameters(s, motion, dict(x)) for s, x in zip((here, there), std, strict=True)
@@ -251,7 +263,8 @@ def _compared(
         difference[name] = Parameter(apart, error or None, p.unit)
         if error > 0.0:
             furthest = max(furthest, abs(apart) / error)
-    odds = math.exp(min(TEMPER * (PER_EFFECT - 0.5 * furthest**2), 50.0))
+    price = PER_EFFECT if is_in_simulation else min(PER_EFFECT, _evidence_of_any(there, theirs))
+    odds = math.exp(min(TEMPER * (price - 0.5 * furthest**2), 50.0))
     return Finding(
         joint_name(motion, here.place.joint), here.name, ours, Location(), 0.5 * furthest**2,
         min(1.0 / (1.0 + odds), MOST_CERTAIN), 0.0, here.effect.formula,

@@ -8,7 +8,13 @@ import pytest
 
 from sgp_ros.cli import main
 from sgp_ros.diagnosis.decide.differences import decide_several
-from sgp_ros.diagnosis.reference import _judged, _sized, against_model, against_simulation
+from sgp_ros.diagnosis.reference import (
+    _compared,
+    _judged,
+    _sized,
+    against_model,
+    against_simulation,
+)
 from sgp_ros.diagnosis.result import Finding, Location, Parameter
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
@@ -71,6 +77,24 @@ def test_a_law_that_the_simulation_is_not_known_to_have_has_no_place_there():
     sized = _sized(stop, EffectAt(EFFECTS['end_stop'], Place(0)))
     assert set(sized.in_simulation) == set(sized.difference) == {'stiffness'}
     assert set(sized.parameters) == {'position', 'stiffness'}
+
+
+@pytest.mark.parametrize(
+    ('level', 'is_in_simulation', 'differs'),
+    [(0.02, False, True), (0.02, True, False), (0.5, False, False)],
+)
+def test_what_a_simulation_is_not_known_to_have_is_no_likelier_there_than_nothing(
+    equations_for, perfect, level, is_in_simulation, differs
+):
+    """It is known too inaccurately to be different; nothing fits it as well as its own size."""
+    _, equations = equations_for(perfect[1])
+    here, there = (
+        EffectAt(EFFECTS['coulomb_friction'], Place(0), coefficients=np.array([x]))
+        for x in (0.9, level)
+    )
+    std = {'level': 0.13}, {'level': 0.24}
+    found = _compared(here, there, std, equations, is_in_simulation=is_in_simulation)
+    assert (found.probability > 0.5) is differs
 
 
 @pytest.mark.skipif(not CASES.is_dir(), reason='shared recordings are elsewhere')
