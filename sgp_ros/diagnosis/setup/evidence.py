@@ -21,7 +21,6 @@ place of bodies and friction. Viscous friction is left out there: with `kd` it i
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -40,24 +39,22 @@ from sgp_ros.diagnosis.criteria import (
     STATED_ERROR,
 )
 from sgp_ros.diagnosis.setup.correction import Acting, Correction, delayed
-from sgp_ros.diagnosis.setup.unknowns import OF_BODIES, OF_ROTORS, SETS, Agreement, Unknowns
+from sgp_ros.diagnosis.setup.rows import PER_PERIOD, WIDE, most_hz, spread
+from sgp_ros.diagnosis.setup.unknowns import (
+    FRICTION,
+    OF_BODIES,
+    OF_ROTORS,
+    SETS,
+    Agreement,
+    Explained,
+    Unknowns,
+    explained,
+)
 from sgp_ros.physics.servo import Servo
 from sgp_ros.rigid.rigid_body import mass_matrix, torque_regressor
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.observed_motion import ObservedMotion
 
-_MOST_ROWS = 1000
-_STRETCHES = 4
-"""Parts of the recording, spread evenly, that are looked at."""
-_PER_PERIOD = 8.0
-"""Rows per period of the cut-off before the filter."""
-_WIDE = 2.5
-"""Cut-off before rows are left out, by that of the filter: motion passes, what would alias not."""
-_BAND, _MOTION = 4.0, 0.99
-"""Cut-off, by the frequency that the motion has below it: this part of its mean squares.
-
-Friction turns at once, and forces of several joints multiply.
-"""
 _KEPT = 50
 """Clock offsets of which the efforts are remembered."""
 _MOTIONS = 8
@@ -84,14 +81,14 @@ class Probe:
         self, raw: RawTrajectory, tree: Tree, bandwidth: Bandwidth, *, knows_bodies: bool = False
     ) -> None:
         motion = observe(raw, tree, bandwidth)
-        if (most := _most_hz(motion)) < bandwidth.cutoff:
+        if (most := most_hz(motion)) < bandwidth.cutoff:
             bandwidth = bandwidth.up_to(most)
             motion = observe(raw, tree, bandwidth)
-        every = max(1, int(1.0 / (raw.step * _PER_PERIOD * bandwidth.cutoff)))
+        every = max(1, int(1.0 / (raw.step * PER_PERIOD * bandwidth.cutoff)))
         self._raw, self.every = raw, every
-        wide = _WIDE * bandwidth.cutoff if every > 1 and not motion.is_static else math.inf
+        wide = WIDE * bandwidth.cutoff if every > 1 and not motion.is_static else math.inf
         smooth = ParallelFilter(1.0 / raw.step, wide, raw.segments)
-        kept = _spread(raw.segments, every, len(smooth.taps) // 2)
+        kept = spread(raw.segments, every, len(smooth.taps) // 2)
         ends = np.cumsum([len(rows) for rows in kept])
         segments = [slice(int(e) - len(rows), int(e)) for e, rows in zip(ends, kept, strict=True)]
         pick = np.concatenate(kept)
@@ -172,27 +169,30 @@ class Probe:
         # by how much the density of recorded accelerations exceeds that of relative errors
         units = -0.5 * self.driven * np.log(power / self.power) - np.log(np.abs(correction.scale))
         volume = float(noisy_volume(units, self._noise_part).sum())
-        rows = min(INDEPENDENT_ROWS, len(both[0]))
-        tried: list[tuple[np.ndarray, Agreement]] = []
+        rows = min(INDEPENDENT_ROWS, len(d))
+        size, p = FRICTION * rms, whole.bodies.shape[2]
+        products = [c.products(x, size) for c, x in zip(columns, both, strict=True)]
+        tried: list[tuple[float, int, Explained]] = []
         usual = OF_BODIES if self._rotors is None else OF_ROTORS
         for number in usual if unknowns is None else (unknowns,):
             kind = SETS[number]
-            d, within = both[kind.level >= 2], columns[kind.level >= 2]
-            own = np.minimum((d**2).mean(axis=0) / power, 1.0)
+            i = int(kind.level >= 2)
+            own = np.minimum(products[i].squares / power, 1.0)
             floor = self._floor(own if nominal is None else nominal) * power
             precision = self._loads[kind.accuracy] if kind.level == 3 else None
-            value, rest, share, w = within.explained(kind, d, power, floor, precision)
-            worth = value - kind.price * (self._rotors is None)
-            left = (rest**2).mean(axis=0) / power
-            tried.append(
-                (w, Agreement(worth, number, left, d / rms, rest / rms, share, rows, own))
-            )
+            found = explained(products[i], kind, power, floor, rows, precision)
+            tried.append((found.evidence - kind.price * (self._rotors is None), number, found))
         shift = partial(self._shift, motion, correction, volume)
         if self.full.has_all_efforts:  # inertia does not change what is best
-            tried.sort(key=lambda t: -t[1].evidence)
-            tried = [next((t for t in tried if np.isfinite(shift(t[0]))), tried[0])]
-        counted = (replace(a, evidence=a.evidence + rows * shift(w)) for w, a in tried)
-        return max(counted, key=lambda a: a.evidence)
+            tried.sort(key=lambda t: -t[0])
+            tried = [next((t for t in tried if np.isfinite(shift(t[2].b[:p]))), tried[0])]
+        counted = [(worth + rows * shift(e.b[:p]), number, e) for worth, number, e in tried]
+        worth, number, best = max(counted, key=lambda t: t[0])
+        i = int(SETS[number].level >= 2)
+        rest = (both[i] - columns[i].force(best.b, size)) / rms
+        own, share = np.minimum(products[i].squares / power, 1.0), best.variance / power
+        left = (rest**2).mean(axis=0)
+        return Agreement(worth, number, left, both[i] / rms, rest, share, rows, own)
 
     def _shift(
         self, motion: ObservedMotion, correction: Correction, volume: float, w: np.ndarray
@@ -264,37 +264,3 @@ class Probe:
         """Return the share of each effort, (k,), that no model explains."""
         floor = 1e-5 + SHAPE_ERROR * nominal
         return floor + self._inaccuracy if self.full.has_all_efforts else floor
-
-
-def _most_hz(motion: ObservedMotion) -> float:
-    """Return the cut-off above which a motion says no more of its connection [Hz].
-
-    Fewer rows a second are then needed, and those that are looked at show more of the motion, up
-    to all of it. A steady turn has no frequency.
-    """
-    if motion.is_static or not motion.moves.any():
-        return math.inf
-    power = np.abs(np.fft.rfft(motion.velocity[:, motion.moves], axis=0)) ** 2
-    power[0] = 0.0
-    part = power.cumsum(axis=0) / np.maximum(power.sum(axis=0), 1e-300)
-    frequency = np.fft.rfftfreq(len(motion.time), motion.step)
-    whole = _MOST_ROWS / (_PER_PERIOD * motion.step * len(motion.time))
-    highest = frequency[np.minimum((part < _MOTION).sum(axis=0), len(frequency) - 1)].max()
-    return max(_BAND * float(highest), whole)
-
-
-def _spread(segments: Sequence[slice], every: int, margin: int) -> list[np.ndarray]:
-    """Return rows of stretches that are spread over a recording, every `every`-th each.
-
-    None are within a margin of the ends of segments.
-    """
-    whole = [np.arange(s.start + margin, s.stop - margin, every) for s in segments]
-    total = sum(len(rows) for rows in whole)
-    if total <= _MOST_ROWS:
-        return whole
-    share, kept = _MOST_ROWS / total, []
-    for rows in whole:
-        parts = max(1, round(_STRETCHES * len(rows) / total))
-        split = np.array_split(rows, parts)
-        kept += [part[: max(64, int(share * len(part)))] for part in split]
-    return kept

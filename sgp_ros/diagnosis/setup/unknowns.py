@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -9,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sgp_ros.diagnosis.compare.parallel_filter import ParallelFilter
-from sgp_ros.diagnosis.criteria import INDEPENDENT_ROWS, PER_PARAMETER, STATED_ERROR
+from sgp_ros.diagnosis.criteria import PER_PARAMETER, STATED_ERROR
 from sgp_ros.physics.memory import bristle
 from sgp_ros.robots.observed_motion import ObservedMotion
 
@@ -95,13 +96,17 @@ class Agreement:
 class Products:
     """Products of the columns of p bodies and eight everyday forces, joint by joint.
 
+    Means over the rows.
+
     Attributes:
         G: (k, p + 8, p + 8) with themselves.
         g: (k, p + 8) with the discrepancy.
+        squares: (k,) of the discrepancy.
     """
 
     G: np.ndarray
     g: np.ndarray
+    squares: np.ndarray
 
     def weighted(self, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the sums over joints with weights (k,), (P, P) and (P,) for P = p + 8 k."""
@@ -114,6 +119,27 @@ class Products:
             A[:p, own], A[own, :p], A[own, own] = G[j, :p, p:], G[j, p:, :p], G[j, p:, p:]
             b[own] = g[j, p:]
         return A, b
+
+    def left(self, b: np.ndarray) -> np.ndarray:
+        """Return the mean squares (k,) that unknowns b (p + 8 k,) leave."""
+        k, p = len(self.squares), self.G.shape[1] - EVERYDAY
+        own = np.concatenate([np.tile(b[:p], (k, 1)), b[p:].reshape(k, EVERYDAY)], axis=1)
+        twice = 2.0 * self.g - (self.G @ own[:, :, None])[:, :, 0]
+        return np.maximum(self.squares - (own * twice).sum(axis=1), 0.0)
+
+
+class Explained(NamedTuple):
+    """Efforts as a set of unknowns explains them.
+
+    Attributes:
+        evidence: logarithm [nats].
+        variance: (k,) mean squares that are left, with those that no model explains.
+        b: (p + 8 k,) the unknowns; 0 for those that are not there.
+    """
+
+    evidence: float
+    variance: np.ndarray
+    b: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,62 +201,60 @@ class Unknowns:
     @cached_property
     def _squares(self) -> np.ndarray:
         X = np.concatenate([self.bodies, self.friction], axis=2).transpose(1, 0, 2)
-        return X.transpose(0, 2, 1) @ X
+        return X.transpose(0, 2, 1) @ X / X.shape[1]
 
     def products(self, d: np.ndarray, size: np.ndarray) -> Products:
         """Return the products for a discrepancy (N, k) and forces of these sizes (k,)."""
-        k, p = d.shape[1], self.bodies.shape[2]
+        (N, k), p = d.shape, self.bodies.shape[2]
         scale = np.ones((k, p + EVERYDAY))
         scale[:, p:] = size[:, None]
         g = np.empty((k, p + EVERYDAY))
         for j in range(k):
             g[j, :p], g[j, p:] = self.bodies[:, j].T @ d[:, j], self.friction[:, j].T @ d[:, j]
-        return Products(self._squares * scale[:, :, None] * scale[:, None, :], g * scale)
+        G = self._squares * scale[:, :, None] * scale[:, None, :]
+        return Products(G, g * scale / N, (d**2).mean(axis=0))
 
     def force(self, b: np.ndarray, size: np.ndarray) -> np.ndarray:
-        """Return the efforts of unknowns b (p,) or (p + 8 k,), (N, k) [N m or N]."""
+        """Return the efforts of unknowns b (p + 8 k,), (N, k) [N m or N]."""
         k, p = self.bodies.shape[1:]
-        found = self.bodies @ b[:p]
-        if len(b) > p:
-            found += (self.friction * (b[p:].reshape(k, EVERYDAY) * size[:, None])).sum(axis=2)
-        return found
+        each = b[p:].reshape(k, EVERYDAY) * size[:, None]
+        return self.bodies @ b[:p] + (self.friction * each).sum(axis=2)
 
-    def explained(
-        self, kind: Set, d: np.ndarray, power: np.ndarray, floor: np.ndarray,
-        precision: np.ndarray | None = None,
-    ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
-        """Return the evidence of efforts, what is left, its share, and changes of bodies.
 
-        Args:
-            kind: unknowns that are there.
-            d: (N, k) discrepancy [N m or N].
-            power: (k,) mean squared efforts.
-            floor: (k,) mean squares that no model explains.
-            precision: (p, p) of the prior of bodies, where it is not that of their accuracy.
-        """
-        N, k = d.shape
-        rows = min(INDEPENDENT_ROWS, N)
-        p = self.bodies.shape[2]
-        size = FRICTION * np.sqrt(power)
-        count = (0, p, p + EVERYDAY * k)[min(kind.level, 2)]
-        prior = np.eye(count)
-        if count:
-            prior[:p, :p] = np.eye(p) / kind.accuracy**2 if precision is None else precision
-        if not kind.builds_up:
-            built = [p + EVERYDAY * j + i for j in range(k) for i in range(PLAIN, EVERYDAY)]
-            prior[built, built] = _NONE
-        variance, left = (d**2).mean(axis=0) + floor, d
-        occam, b = 0.0, np.zeros(count)
-        products = self.products(d, size) if count else None
-        for _ in range(_ROUNDS if products is not None else 0):
-            assert products is not None
-            A, g = (x[:count, ...] for x in products.weighted(rows / N / variance))
-            A = A[:, :count] + prior
-            b = np.linalg.solve(A, g)
-            left = d - self.force(b, size)
-            variance = (left**2).mean(axis=0) + floor
-        if count:
-            occam = 0.5 * float(np.linalg.slogdet(A)[1] - np.linalg.slogdet(prior)[1])
-        share = variance / power
-        value = -0.5 * rows * float(np.log(share).sum()) - 0.5 * float(b @ prior @ b) - occam
-        return value, left, share, b[:p] if count else np.zeros(p)
+def explained(
+    products: Products, kind: Set, power: np.ndarray, floor: np.ndarray, rows: float,
+    precision: np.ndarray | None = None,
+) -> Explained:  # fmt: skip
+    """Return the evidence of efforts with a set of unknowns.
+
+    Args:
+        products: of the discrepancy and the columns.
+        kind: unknowns that are there.
+        power: (k,) mean squared efforts.
+        floor: (k,) mean squares that no model explains.
+        rows: number that counts as independent.
+        precision: (p, p) of the prior of bodies, where it is not that of their accuracy.
+    """
+    k, p = len(power), products.G.shape[1] - EVERYDAY
+    b = np.zeros(p + EVERYDAY * k)
+    count = (0, p, len(b))[min(kind.level, 2)]
+    prior = np.eye(count)
+    if count:
+        prior[:p, :p] = np.eye(p) / kind.accuracy**2 if precision is None else precision
+    if not kind.builds_up:
+        built = [p + EVERYDAY * j + i for j in range(k) for i in range(PLAIN, EVERYDAY)]
+        prior[built, built] = _NONE
+    variance, occam = products.squares + floor, 0.0
+    for _ in range(_ROUNDS if count else 0):
+        A, g = products.weighted(rows / variance)
+        A = A[:count, :count] + prior
+        try:
+            b[:count] = np.linalg.solve(A, g[:count])
+        except np.linalg.LinAlgError:  # units so far off that nothing can be computed
+            return Explained(-math.inf, variance, np.zeros(len(b)))
+        variance = products.left(b) + floor
+    if count:
+        occam = 0.5 * float(np.linalg.slogdet(A)[1] - np.linalg.slogdet(prior)[1])
+    own = b[:count]
+    value = -0.5 * rows * float(np.log(variance / power).sum()) - 0.5 * float(own @ prior @ own)
+    return Explained(value - occam, variance, b)

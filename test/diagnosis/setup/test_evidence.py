@@ -11,10 +11,12 @@ import pytest
 
 from sgp_ros.diagnosis.compare.bandwidth import choose_bandwidth
 from sgp_ros.diagnosis.compare.trajectory import collect
-from sgp_ros.diagnosis.setup import evidence
+from sgp_ros.diagnosis.setup import rows
 from sgp_ros.diagnosis.setup.correction import Correction
-from sgp_ros.diagnosis.setup.evidence import Probe, _most_hz
+from sgp_ros.diagnosis.setup.evidence import Probe
+from sgp_ros.diagnosis.setup.rows import most_hz
 from sgp_ros.diagnosis.setup.search import search
+from sgp_ros.diagnosis.setup.unknowns import EVERYDAY, SETS, Products, explained
 from sgp_ros.physics.catalogue import ARMATURE
 from sgp_ros.physics.effect_at import EffectAt
 from test.diagnosis.worlds import CHAINS, PERIOD, events_of, robot_of, simulate
@@ -57,6 +59,14 @@ def test_efforts_that_are_recorded_prize_no_inertia(slow):
     assert probe.agreement(far).evidence < probe.agreement(none).evidence
 
 
+def test_columns_so_large_that_nothing_can_be_computed_explain_nothing():
+    """A search may try a scale of a position that makes them so."""
+    count = 2 + EVERYDAY
+    equal = Products(np.full((1, count, count), 1e40), np.ones((1, count)), np.ones(1))
+    one = np.ones(1)
+    assert explained(equal, SETS[1], one, 1e-5 * one, 100.0).evidence == -math.inf
+
+
 def test_less_of_a_rotor_than_stated_may_be(slow):
     """Where it is most of the inertia of a joint; less than nothing cannot be."""
     world, robot, tree = slow
@@ -72,7 +82,7 @@ def test_less_of_a_rotor_than_stated_may_be(slow):
 
 def test_where_forces_cancel_their_accuracy_counts(slow, tmp_path, monkeypatch):
     """Inertial forces are larger than a fast robot's effort, and nothing in a slow one's."""
-    monkeypatch.setattr(evidence, '_BAND', math.inf)
+    monkeypatch.setattr(rows, '_BAND', math.inf)
     world = simulate(CHAINS[1], 5, 12.0)
     robot, tree = robot_of(tmp_path, CHAINS[1])
     swinging, none = probe_of(world, robot, tree), Correction.none(1)
@@ -145,7 +155,7 @@ def test_the_band_is_that_of_the_motion(hz, noise, most):
         is_static=False, moves=np.array([True, False]), time=time, step=0.004,
         velocity=np.column_stack([velocity, np.zeros(len(time))]),
     )  # fmt: skip
-    found = _most_hz(motion)
+    found = most_hz(motion)
     assert found == pytest.approx(most, rel=0.05) if noise < 1.0 else found > most
 
 
@@ -159,5 +169,5 @@ def test_the_mean_of_a_steady_turn_is_no_band(noise):
     motion = SimpleNamespace(
         is_static=False, moves=np.array([True]), time=time, step=0.004, velocity=velocity[:, None]
     )
-    found = _most_hz(motion)
+    found = most_hz(motion)
     assert found == pytest.approx(0.625) if noise == 0.0 else found > 0.625
