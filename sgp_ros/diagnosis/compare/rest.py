@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy import ndimage
 
 from sgp_ros.diagnosis.compare.trajectory import Bandwidth, RawTrajectory
 from sgp_ros.robots.observed_motion import ObservedMotion
@@ -11,6 +12,8 @@ _SLOW, _CREEP = 1e-3, 1e-2
 """Speeds, of the mean square one, below which a joint rests, and below which it may."""
 _NOISES = 4.0
 """Noises below which a speed is none."""
+_PERIODS = 1.0
+"""Time over which the noise of positions is averaged, in periods of their cut-off."""
 _PUSHED = 0.1
 """Acceleration, of the mean square one, below which a slow joint neither stops nor starts."""
 _NARROW = 1e-2
@@ -24,7 +27,8 @@ def resting(raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwidth) ->
     within a small part of their range: friction is elastic before it slides. What leads there is
     motion.
     """
-    noise = np.sqrt((2 * np.pi) ** 2 * raw.noise_density * bandwidth.state_cutoff**3 / 3.0)
+    density = np.minimum(raw.noise_density, _density(raw, motion, bandwidth))
+    noise = np.sqrt((2 * np.pi) ** 2 * density * bandwidth.state_cutoff**3 / 3.0)
     typical, pushes = (
         np.sqrt((x**2).mean(axis=0)) for x in (motion.velocity, motion.acceleration)
     )
@@ -33,13 +37,28 @@ def resting(raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwidth) ->
     for j in range(motion.velocity.shape[1]):
         q, speed = motion.position[:, j], np.abs(motion.velocity[:, j])
         push = np.abs(motion.acceleration[:, j]) / max(float(pushes[j]), 1e-300)
-        noisy, least = _NOISES * float(noise[j]), _SLOW * float(typical[j])
-        surely, perhaps = max(noisy, least), max(noisy, _CREEP * typical[j])
+        noisy, least = _NOISES * noise[:, j], _SLOW * float(typical[j])
+        surely, perhaps = np.maximum(noisy, least), np.maximum(noisy, _CREEP * typical[j])
         slow = _slow(speed, surely, shortest)
         slow += [x for x in _slow(speed, perhaps, shortest) if np.ptp(q[x]) < _NARROW * np.ptp(q)]
         for part in slow:
             rests[_standing(speed, push, part, least), j] = True
     return rests
+
+
+def _density(
+    raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwidth
+) -> np.ndarray:  # fmt: skip
+    """Return the density of the positions' noise at each time, (n, k) [rad^2/Hz or m^2/Hz].
+
+    From what smoothing takes away: jitter of stamps makes a noise of fast motions, none of
+    slow ones, which are no rest because of it.
+    """
+    squares = (raw.position - motion.position) ** 2
+    count = max(4, round(_PERIODS / (bandwidth.state_cutoff * raw.step)))
+    mean = ndimage.uniform_filter1d(squares, count, axis=0, mode='nearest')
+    above = max(0.5 / raw.step - bandwidth.state_cutoff, bandwidth.state_cutoff)
+    return np.asarray(np.maximum(mean, 0.0) / above)
 
 
 def _standing(speed: np.ndarray, push: np.ndarray, part: slice, least: float) -> slice:
@@ -53,9 +72,9 @@ def _standing(speed: np.ndarray, push: np.ndarray, part: slice, least: float) ->
     return slice(part.start + int(there[0]), part.start + int(there[-1]) + 1)
 
 
-def _slow(speed: np.ndarray, limit: float, shortest: int) -> list[slice]:
-    """Return the stretches below three times a speed that have enough rows below it."""
-    wide = np.concatenate([[False], speed < 3.0 * limit, [False]])
+def _slow(speed: np.ndarray, limit: np.ndarray, shortest: int) -> list[slice]:
+    """Return the stretches below three times a speed (n,) that have enough rows below it."""
+    wide = np.concatenate([[False], speed <= 3.0 * limit, [False]])
     edges = np.flatnonzero(np.diff(wide.astype(int)))
     parts = (slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True))
-    return [part for part in parts if np.sum(speed[part] < limit) >= shortest]
+    return [part for part in parts if np.sum((speed <= limit)[part]) >= shortest]

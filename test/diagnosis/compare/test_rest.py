@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,14 +14,20 @@ STEP = 0.005
 BANDWIDTH = Bandwidth(4.0, 10.0)
 
 
-def rests(velocity, noise_density=1e-20):
-    """Return where a joint of these speeds rests, usually with next to no noise."""
+def rests(velocity, noise_density=1e-20, jitter=0.0):
+    """Return where a joint of these speeds rests, usually with next to no noise.
+
+    With noise of its positions that has a density, and with jitter of its stamps [s].
+    """
     position = STEP * np.cumsum(velocity)[:, None]
     acceleration = np.gradient(velocity)[:, None] / STEP
     motion = SimpleNamespace(
         velocity=velocity[:, None], position=position, acceleration=acceleration
     )
-    raw = SimpleNamespace(step=STEP, noise_density=np.full(1, noise_density))
+    spread = np.hypot(math.sqrt(0.5 * noise_density / STEP), jitter * velocity[:, None])
+    rough = spread * np.random.default_rng(1).normal(0.0, 1.0, position.shape)
+    density = 2.0 * STEP * np.full(1, rough.var())
+    raw = SimpleNamespace(step=STEP, noise_density=density, position=position + rough)
     return resting(raw, motion, BANDWIDTH)[:, 0]
 
 
@@ -50,6 +57,15 @@ def test_a_reversal_is_no_rest_and_a_still_joint_is():
     assert not found[190:210].any()
 
 
+def test_a_slow_reversal_is_no_rest_because_stamps_of_fast_motions_jitter():
+    """Noise of positions is that of their speed: where this is small, so is the noise."""
+    speed, still = swings(np.zeros(200))
+    slow = 0.1 * np.sin(2.0 * np.pi * 0.25 * STEP * np.arange(800))
+    found = rests(np.concatenate([speed, slow, speed]), jitter=0.002)
+    assert found[still].mean() > 0.9
+    assert found[1850:2550].mean() < 0.1
+
+
 def test_a_joint_that_slows_down_moves_until_it_stands():
     """Jitter of stamps makes a noise of fast motions, which is none of the stop."""
     slowing = np.linspace(1.0, 0.0, 200)
@@ -64,5 +80,5 @@ def test_a_joint_without_any_speed_rests():
     still = SimpleNamespace(
         velocity=np.zeros((50, 1)), position=np.ones((50, 1)), acceleration=np.full((50, 1), 1e-9)
     )
-    raw = SimpleNamespace(step=STEP, noise_density=np.full(1, 1e-20))
+    raw = SimpleNamespace(step=STEP, noise_density=np.full(1, 1e-20), position=still.position)
     assert resting(raw, still, BANDWIDTH).all()
