@@ -27,7 +27,7 @@ from sgp_ros.diagnosis.explain.screening import distinct, screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
-from sgp_ros.physics.place import JOINT, MOTOR
+from sgp_ros.physics.place import JOINT, MOTOR, PLACES
 
 _MOVED = 2
 """Other places at which a law is tried in place of its own."""
@@ -219,6 +219,31 @@ def elsewhere(columns: Columns, model: Model) -> Iterator[Model]:
         found = distinct(screen(columns, base, [s.effect]))
         others = [x for x in found if x.place.joint != s.place.joint]
         yield from (refitted(columns, base, arranged, x) for x in others[:_MOVED])
+
+
+def in_common(columns: Columns, model: Model) -> Iterator[Model]:
+    """Yield a model with one law of all motors in place of those that are late at single ones.
+
+    A clock or a bus makes all late. Where friction hides much of that, a joint alone takes a part
+    of it for a lag, and none would give that up for a delay of its own.
+    """
+    motion = model.frame.equations.motion
+    late = [s for s in model.effects if s.effect.stage and s.effect.quantities[0].unit == 's'
+            and s.place.joint >= 0]  # fmt: skip
+    laws = [e for e in motion.catalogue.values() if e.takes_all and e.places(motion)]
+    if not late:
+        return
+    kept = tuple(s for s in model.effects if s not in late)
+    without = refitted(columns, model, (kept, len(kept)))
+    found = [x for x in screen(columns, without, laws) if x[1].place.joint == PLACES['all']]
+    for s in distinct(found, 1):
+        trial = refitted(columns, without, (kept, len(kept)), s)
+        may = tuple(x for x in trial.effects if x.is_possible(motion))
+        if len(may) < len(trial.effects):  # they made up for a part of it
+            trial = refitted(columns, trial, (may, len(may)))
+        for block in blocks_of(trial):
+            trial = grown(columns, trial, block) if block.joints else trial
+        yield trial
 
 
 def two_for_one(columns: Columns, model: Model) -> Iterator[Model]:

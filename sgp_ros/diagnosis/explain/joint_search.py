@@ -26,6 +26,7 @@ from sgp_ros.diagnosis.explain.growth import (
     blocks_of,
     elsewhere,
     grown,
+    in_common,
     refitted,
     two_for_one,
 )
@@ -68,7 +69,7 @@ def by_joint(columns: Columns, model: Model) -> list[Model]:
             if trace(model) in columns.settled:
                 return []
             columns.settled.add(trace(model))
-            others = (coupled, two_for_one, elsewhere)
+            others = (coupled, two_for_one, elsewhere, in_common)
             better = best_of(model, (t for trials in others for t in trials(columns, model)))
             if better is None:
                 break

@@ -24,7 +24,14 @@ from sgp_ros.diagnosis.explain.candidates import fit, split
 from sgp_ros.diagnosis.explain.credibility import gain, is_credible
 from sgp_ros.diagnosis.explain.fitted_model import beyond_plain, first_scale, floors
 from sgp_ros.diagnosis.explain.frame import Frame
-from sgp_ros.diagnosis.explain.growth import Block, crossed, elsewhere, grown, two_for_one
+from sgp_ros.diagnosis.explain.growth import (
+    Block,
+    crossed,
+    elsewhere,
+    grown,
+    in_common,
+    two_for_one,
+)
 from sgp_ros.diagnosis.explain.joint_search import (
     built_up,
     by_joint,
@@ -39,7 +46,7 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import are_apart, distinct, screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt, one_of_each
-from sgp_ros.physics.place import Place
+from sgp_ros.physics.place import Place, joint_name
 from test.diagnosis.worlds import CHAINS, heavier, recorded, simulate
 from test.simulation.trees import arm
 
@@ -310,6 +317,22 @@ def test_an_elastic_joint_is_looked_for_where_it_was_not_found(tmp_path):
     assert best is not None
     assert [s.place.joint for s in best.effects] == [1]
     assert best.mean_square.sum() < 0.1 * wrong.mean_square.sum()
+
+
+def test_a_delay_of_all_motors_takes_the_place_of_what_imitates_it_at_each(tmp_path):
+    """A lag at one, a delay of its own at another; what made up for a part of it goes."""
+    raw, tree = recorded(tmp_path, arm(), ['command_delay:joint=all,delay=0.03'], seconds=6.0)
+    columns, base = _start(make_equations(raw, tree, choose_bandwidth(raw, tree)))
+    apart = ('actuator_lag', 0, [0.03]), ('command_delay', 1, [0.03]), ('spring', 0, [])
+    effects = tuple(EffectAt(EFFECTS[n], Place(j), np.array(x)) for n, j, x in apart)
+    wrong = fit(columns, effects, base.sigma, is_free=False)
+    (found,) = in_common(columns, wrong)
+    delay = next(s for s in found.effects if s.name == 'command_delay')
+    assert joint_name(base.frame.equations.motion, delay.place.joint) == 'all'
+    assert delay.shape[0] == pytest.approx(0.03, rel=0.05)
+    assert not any(s.name == 'actuator_lag' for s in found.effects)
+    assert gain(found, wrong) > PER_EFFECT
+    assert not list(in_common(columns, base))
 
 
 @pytest.mark.parametrize(('nominal', 'is_slight'), [(0.01, False), (0.05, True)])
