@@ -89,7 +89,8 @@ def _beside_unknown(
     equations: Equations, decision: Decision
 ) -> tuple[Model, dict[object, float]]:  # fmt: skip
     """Return a model with the friction that stands at unknown joints, and its deviations."""
-    found = [_standing(equations, decision.model, j) for j in decision.unknown]
+    open_shape = [j for j in decision.unknown if j not in decision.shaped]
+    found = [_standing(equations, decision.model, j) for j in open_shape]
     standing = {s: x for laws in found for s, x in laws.items()}
     if not standing:
         return decision.model, {}

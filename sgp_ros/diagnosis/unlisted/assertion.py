@@ -37,6 +37,7 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.unlisted.beside import PLAIN, acts_as_bodies, law_of, own_effects, says_less
 from sgp_ros.diagnosis.unlisted.search import search
 from sgp_ros.diagnosis.unlisted.searched import Searched, leaves_more
+from sgp_ros.diagnosis.unlisted.shapes import smooth_of
 from sgp_ros.diagnosis.unlisted.tried import is_beaten, promises
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.place import Place
@@ -191,6 +192,9 @@ def _decided(
     laws = searched.laws[:_RIVALS]
     refusals = dict(decision.refusals) | {m.key: f'no formula is asserted: {why}' for m in laws}
     beside = searched.everyday(Columns(equations), Scale.of(equations, found.comparison))
+    is_friction = smooth_of(searched.smooth, searched.joint)[1].is_of_own_speed
+    if beside is None and is_friction:  # which may be any friction: none is told apart from it
+        beside = decision.model, {}
     shaped = {**decision.shaped, **({searched.joint: beside} if beside else {})}
     decision = replace(
         decision, rivals=(*laws, *decision.rivals), refusals=refusals, shaped=shaped

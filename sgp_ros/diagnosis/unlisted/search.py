@@ -154,8 +154,7 @@ class _Look:
         effects = list(smooth_forces(motion, self.joint))
         for base in self._bases():
             own = own_effects(base, self.joint)
-            others = [e for e in effects if e.gate not in {'', 'sign', 'soft'}
-                      or not any(e.variable.is_of(s) for s in own)]  # fmt: skip
+            others = [e for e in effects if not any(e.has_form_of(s) for s in own)]
             for is_plain in (True, False):
                 alike = [e for e in others if e.variable.is_plain is is_plain]
                 yield from self._fitted(base, alike, SMOOTH if is_plain else 1)
@@ -174,7 +173,7 @@ class _Look:
         for kept in dict.fromkeys(bases):
             base = self._without(kept, is_free=best.is_free)
             own = own_effects(base, self.joint)
-            alike = [e for e in effects if e.gate or not any(e.variable.is_of(s) for s in own)]
+            alike = [e for e in effects if e.gate or not any(e.has_form_of(s) for s in own)]
             for model in list(self._fitted(base, alike, SMOOTH)):
                 yield self._with_weight(base, model)
 

@@ -75,7 +75,8 @@ class Searched:
             scale: of mean squares.
         """
         model, (placed, force) = self.smooth, smooth_of(self.smooth, self.joint)
-        if force.variable.index == self.joint and force.variable.kind == 'dq':
+        is_of_speed = force.variable.index == self.joint and force.variable.kind == 'dq'
+        if is_of_speed and not force.is_of_own_speed:
             return None
         may = [
             s for s, share in zip(model.effects, model.filtered_shares, strict=True)
@@ -104,6 +105,7 @@ class Searched:
         alike = {'sign': COULOMB_FRICTION, 'soft': COULOMB_FRICTION, 'speed': VISCOUS_FRICTION,
                  'ahead': VISCOUS_FRICTION, 'back': VISCOUS_FRICTION}.get(force.gate)  # fmt: skip
         is_alike = s.effect is alike and force.factor_of[0] == self.joint
+        is_alike = is_alike or (force.is_of_own_speed and force.has_form_of(s))
         return s.place.joint == self.joint and s.effect.is_usual and not is_alike
 
 

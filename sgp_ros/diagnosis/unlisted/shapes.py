@@ -20,6 +20,7 @@ from scipy.interpolate import BSpline
 from sgp_ros.diagnosis.decide.everyday import LONGEST_LAG
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.unlisted.variables import DEGREE, FORCES, MEMORY, Variable
+from sgp_ros.physics.catalogue import COULOMB_FRICTION
 from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.formula import read_formula
@@ -142,6 +143,14 @@ class SmoothForce(Effect):
         """Its joint, number of pieces, variable with its weight, and factor."""
         weight = f'{self.variable.other[2]:.9g}' if self.variable.other else ''
         return f'{self.name} {self.joint} {len(self.linear)} {weight} {self.formula}'
+
+    def has_form_of(self, s: EffectAt) -> bool:
+        """Return whether a listed effect is one of its forms.
+
+        A spline follows no jump at rest, so dry friction is none of a force without a factor.
+        """
+        is_jump = s.effect is COULOMB_FRICTION and not self.gate
+        return self.gate in {'', 'sign', 'soft'} and self.variable.is_of(s) and not is_jump
 
     def places(self, motion: SeenMotion) -> list[Place]:
         """Return its joint."""

@@ -183,6 +183,16 @@ def test_what_stands_beside_a_known_shape_has_its_number_there(equations_for, un
         assert found.standing == {key: 0.02}
 
 
+def test_no_friction_is_told_apart_from_an_unknown_force_of_the_speed(equations_for):
+    """Where a search for a law found such a force, and nothing that stands beside it."""
+    world = {'force': _wave(1.5), 'dry': lambda t, q, s: 1.5 * LEVEL}
+    equations, comparison, _ = _decided(equations_for, **world)
+    decision = _unexplained(equations)[1]
+    assert with_everyday(equations, comparison, decision).standing
+    known = replace(decision, shaped={0: (decision.model, {})})
+    assert not with_everyday(equations, comparison, known).standing
+
+
 def test_a_described_joint_stays_as_it_is(rubbed):
     equations, comparison, found = rubbed
     known = replace(found, unknown=(), standing={})

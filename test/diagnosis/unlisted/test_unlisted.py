@@ -598,11 +598,11 @@ def test_laws_of_two_joints_are_found_together(equations_for):
         np.testing.assert_allclose(law.force(motion)[:, joint], expected, atol=0.02)
 
 
-def _shaped(equations, effects):
-    """Return a search that ended with a force of the position, and its columns and scale."""
+def _shaped(equations, effects, form=('q', '')):
+    """Return a search that ended with a force of one variable, and its columns and scale."""
     columns, motion = Columns(equations), equations.motion
-    variable = Variable('q', 0, 'joint0')
-    smooth = SmoothForce(0, variable, '', variable.knots(motion, FINE), 'joint0')
+    variable = Variable(form[0], 0, 'joint0')
+    smooth = SmoothForce(0, variable, form[1], variable.knots(motion, FINE), 'joint0')
     laws = [EffectAt(EFFECTS[name], Place(0)) for name in effects]
     sigma = fitted(equations).sigma
     model = fit(columns, (EffectAt(smooth, Place(0), np.zeros(0)), *laws), sigma, is_free=False)
@@ -645,6 +645,34 @@ def test_everyday_laws_stand_beside_a_force_of_known_shape(
     smooth = searched.smooth
     gone = sum(f for s, f in zip(smooth.effects, smooth.forces, strict=True) if s.key not in std)
     np.testing.assert_allclose(model.residual, smooth.residual + gone)
+
+
+def _of_speed(gate=''):
+    variable = Variable('dq', 0, 'joint0')
+    return SmoothForce(0, variable, gate, np.linspace(-1.0, 1.0, 12), 'joint0')
+
+
+@pytest.mark.parametrize(
+    ('gate', 'name', 'is_form'),
+    [('', 'coulomb_friction', False), ('', 'viscous_friction', True), ('', 'spring', False),
+     ('sign', 'coulomb_friction', True), ('effort', 'coulomb_friction', False)],
+)  # fmt: skip
+def test_a_spline_of_the_speed_is_damping_and_no_jump(gate, name, is_form):
+    assert _of_speed(gate).has_form_of(EffectAt(EFFECTS[name], Place(0))) is is_form
+
+
+@pytest.mark.parametrize(('gate', 'standing'), [('', {'coulomb_friction'}), ('sign', set())])
+def test_of_friction_only_a_jump_stands_beside_a_force_of_the_own_speed(
+    equations_for, gate, standing
+):
+    """Damping is a part of that force; with a sign as its factor so is dry friction."""
+    world = simulate(
+        CHAINS[1], 9, 20.0, force=lambda _t, q, v: (-0.005 * max(v[0], 0.0) ** 2,),
+        dry=lambda *_: 1.5,
+    )  # fmt: skip
+    searched, columns, scale = _shaped(equations_for(world)[1], _RUBBED[1:], ('dq', gate))
+    found = searched.everyday(columns, scale)
+    assert ({s.name for s in found[0].effects} if found else set()) == standing
 
 
 def test_what_stands_beside_a_refused_formula_is_part_of_the_decision(monkeypatch, equations_for):
