@@ -79,16 +79,18 @@ def traded_remarks(
     Numbers of several bodies may do the same, so that none is known by itself. Of changes
     `x ~ N(x_hat, C)`, a set u costs `x_u' C_uu^-1 x_u / 2` nats if it stays as stated, and the
     others are then `x_hat - C_u C_uu^-1 x_u` [source: conditional normal distribution]. What a
-    number saves must be worth `EVIDENCE`, and no small part of what all of them cost.
+    number saves must be worth `EVIDENCE`, and no small part of what all of them cost, beside
+    constant forces of the motors too. What is said is without these, as all others are stated.
     """
     if not model.is_free:
         return
     told = {(e.link, e.parameter) for e in errors}
     stated = equations.motion.tree.parameters
-    model = _with_offsets(equations, model)
-    numbers, C = _numbers(equations, model.w, _of_bodies(model), stated, unstated)
-    unit = np.sqrt(np.maximum(np.diag(C), 1e-300))
-    x, C = np.array([e.value - e.nominal for e in numbers]) / unit, C / np.outer(unit, unit)
+    alone, beside = (
+        _numbers(equations, m.w, _of_bodies(m), stated, unstated)
+        for m in (model, _with_offsets(equations, model))
+    )
+    numbers, (x, C, _), plain = alone[0], _in_units(*beside), _in_units(*alone)
     held = [i for i, e in enumerate(numbers) if (e.link, e.parameter) not in told]
     asked = max(EVIDENCE, STRUCTURE_LEAST_SHARE * _cost(x, C, [*range(len(x))]))
     while held:
@@ -97,7 +99,7 @@ def traded_remarks(
         if _cost(x, C, held) < least + asked:
             return
         likely = [i for i in held if costs[i] < least + PER_PARAMETER]
-        said = (_alone(numbers[i], unit[i], x, C, i, [u for u in held if u != i]) for i in likely)
+        said = (_alone(numbers[i], *plain, i, [u for u in held if u != i]) for i in likely)
         yield (
             'Bodies differ in one more number, which this motion cannot place. If all others '
             f'are as stated, it is {" or ".join(said)}.'
@@ -105,12 +107,20 @@ def traded_remarks(
         held.remove(min(costs, key=lambda i: costs[i]))
 
 
+def _in_units(
+    numbers: Sequence[ParameterError], C: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return changes of numbers and their covariance in units of their deviations, and these."""
+    unit = np.sqrt(np.maximum(np.diag(C), 1e-300))
+    return np.array([e.value - e.nominal for e in numbers]) / unit, C / np.outer(unit, unit), unit
+
+
 def _alone(
-    e: ParameterError, unit: float, x: np.ndarray, C: np.ndarray, i: int, held: list[int]
+    e: ParameterError, x: np.ndarray, C: np.ndarray, unit: np.ndarray, i: int, held: list[int]
 ) -> str:
     """Return what a number is if those that are held are as stated."""
     solved = np.linalg.lstsq(C[np.ix_(held, held)], C[held, i], rcond=None)[0]
-    now = e.nominal + float(x[i] - solved @ x[held]) * unit
+    now = e.nominal + float(x[i] - solved @ x[held]) * float(unit[i])
     name = 'mass' if e.parameter == 'mass' else f'{e.parameter[-1]} of the centre of mass'
     return f'{name} of {e.link} {now:.3g} instead of {e.nominal:.3g} {e.unit}'
 
