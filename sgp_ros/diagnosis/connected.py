@@ -141,7 +141,8 @@ class Connected:
         if has_efforts:
             model, scale = replace(model, inertia=model.delivered), replace(scale, carried=0.0)
         if done is not None and not has_efforts:
-            stated = self.equations.loop.volume(0.0 * recorded, 1.0 / done.kp, 1.0 / done.kd)
+            kp, kd = (x * done.scale / done.effort_scale for x in (done.kp, done.kd))
+            stated = self.equations.loop.volume(0.0 * recorded, 1.0 / kp, 1.0 / kd)
             units = model.inertia - stated - np.log(np.abs(done.scale))
             shown = noisy_volume(units, self.equations.noise_part)
             unit = np.log(np.abs(done.effort_scale))

@@ -10,6 +10,7 @@ import pytest
 
 from sgp_ros.batch.acceptance import USUAL
 from sgp_ros.diagnosis import connected
+from sgp_ros.diagnosis.compare.volume import Loop
 from sgp_ros.diagnosis.connected import Connected
 from sgp_ros.diagnosis.criteria import PER_EFFECT, STATED_ERROR
 from sgp_ros.diagnosis.gathered import Knowledge, gather
@@ -120,6 +121,28 @@ def test_a_unit_moves_as_bodies_that_are_as_much_heavier_do(monkeypatch, noise_p
     assert worth(_Residual(left / 1e6, np.zeros(2), 0.0 * size), 0.0, 1e3) == pytest.approx(
         heavier
     )
+
+
+@pytest.mark.parametrize('scale', [0.3, 3.0])
+def test_another_unit_of_positions_is_no_prize_where_a_drive_is_stiff(monkeypatch, scale):
+    """Its gains, in the unit of what was recorded, make its motion; of given efforts it is one."""
+    monkeypatch.setattr(connected, 'Scale', SimpleNamespace(of=lambda *_: _OfMotion(carried=0.0)))
+    omega, one = np.linspace(1.0, 30.0, 16), np.ones(1)
+
+    def worth(gain, done):
+        size = 1.0 if done is None else float(done.scale[0])
+        loop = Loop(one, gain * size * one, 0.0 * one, omega)
+        model = _Residual(1e-3 * one, 0.0 * one, 0.0 * one)
+        equations = SimpleNamespace(
+            motion=SimpleNamespace(has_all_efforts=False), noise_part=0.0 * one, loop=loop
+        )
+        decision = SimpleNamespace(model=model, tentative=None)
+        several = SimpleNamespace(decision=decision, comparison=SimpleNamespace(base=model))
+        return Connected(None, equations, several, done).worth(0.0, one)
+
+    done = replace(Correction.none(1), scale=scale * one)
+    assert worth(1e5, done) == pytest.approx(worth(1e5, None), abs=0.05)
+    assert worth(0.0, done) == pytest.approx(worth(0.0, None) - np.log(scale), abs=0.05)
 
 
 @pytest.mark.parametrize(('factor', 'accuracy'), [(1.03, STATED_ERROR), (1.6, 1.0)])

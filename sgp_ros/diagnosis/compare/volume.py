@@ -46,17 +46,23 @@ class Loop:
         omega = 2.0 * np.pi * cutoff * (np.arange(_LINES) + 0.5) / _LINES
         return cls(inertia, kp, kd, omega)
 
+    @property
+    def is_closed(self) -> bool:
+        """Whether drives hold positions, so that their gains bound the error of a motion."""
+        return bool(self.kp.any())
+
     def volume(
         self, inertia: np.ndarray, kp: np.ndarray | float = 1.0, kd: np.ndarray | float = 1.0
     ) -> np.ndarray:
         """Return the mean of log |L / L nominal|, (k,).
 
         Args:
-            inertia: (k,) log of the inertia relative to the nominal one.
+            inertia: (k,) log of the inertia relative to the nominal one; of a motion that was
+                recorded in another unit, of the inertia by that unit.
             kp: gains relative to those stated.
             kd: the same of the rates.
         """
-        if not np.isfinite(inertia).all() or not self.kp.any():
+        if not np.isfinite(inertia).all() or not self.is_closed:
             return inertia
         return self._log(self.inertia * np.exp(inertia), kp * self.kp, kd * self.kd) - self._log(
             self.inertia, self.kp, self.kd

@@ -167,7 +167,9 @@ class Probe:
         power = self._delivered(motion, correction)
         rms = np.sqrt(power)
         # by how much the density of recorded accelerations exceeds that of relative errors
-        units = -0.5 * self.driven * np.log(power / self.power) - np.log(np.abs(correction.scale))
+        units = -0.5 * self.driven * np.log(power / self.power)
+        if not self._loop.is_closed:
+            units = units - np.log(np.abs(correction.scale))
         volume = float(noisy_volume(units, self._noise_part).sum())
         rows = min(INDEPENDENT_ROWS, len(d))
         size, p = FRICTION * rms, whole.bodies.shape[2]
@@ -199,6 +201,8 @@ class Probe:
     ) -> float:
         """Return the evidence of the inertia of bodies w by row; -inf where none can be so."""
         inertia = self._log_inertia(motion.tree, w, motion.position[self._pose])
+        if self._loop.is_closed:  # gains are stated in the unit of the recorded positions
+            inertia = inertia - np.log(np.abs(correction.scale))
         shift = float(self._loop.volume(inertia, correction.kp, correction.kd).sum())
         if not np.isfinite(shift):
             return shift
