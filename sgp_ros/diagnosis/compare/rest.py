@@ -27,8 +27,8 @@ def resting(raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwidth) ->
     within a small part of their range: friction is elastic before it slides. What leads there is
     motion.
     """
-    density = np.minimum(raw.noise_density, _density(raw, motion, bandwidth))
-    noise = np.sqrt((2 * np.pi) ** 2 * density * bandwidth.state_cutoff**3 / 3.0)
+    per = (2 * np.pi) ** 2 * bandwidth.state_cutoff**3 / 3.0
+    noise, now = (np.sqrt(per * x) for x in (raw.noise_density, _density(raw, motion, bandwidth)))
     typical, pushes = (
         np.sqrt((x**2).mean(axis=0)) for x in (motion.velocity, motion.acceleration)
     )
@@ -37,7 +37,10 @@ def resting(raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwidth) ->
     for j in range(motion.velocity.shape[1]):
         q, speed = motion.position[:, j], np.abs(motion.velocity[:, j])
         push = np.abs(motion.acceleration[:, j]) / max(float(pushes[j]), 1e-300)
-        noisy, least = _NOISES * noise[:, j], _SLOW * float(typical[j])
+        least = _SLOW * float(typical[j])
+        noisy = _NOISES * np.minimum(
+            noise[j], np.maximum(now[:, j], _CREEP * typical[j] / _NOISES)
+        )
         surely, perhaps = np.maximum(noisy, least), np.maximum(noisy, _CREEP * typical[j])
         slow = _slow(speed, surely, shortest)
         slow += [x for x in _slow(speed, perhaps, shortest) if np.ptp(q[x]) < _NARROW * np.ptp(q)]
