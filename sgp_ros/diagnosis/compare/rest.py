@@ -23,9 +23,9 @@ _NARROW = 1e-2
 def resting(raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwidth) -> np.ndarray:
     """Return where joints rest, (n, k).
 
-    They are slower there than the noise of the velocity for some time; or they creep, and stay
-    within a small part of their range: friction is elastic before it slides. What leads there is
-    motion.
+    They are slower there than the noise of the velocity for some time: than that of the whole
+    recording, and than that of the time, unless they creep. Or they creep, and stay within a small
+    part of their range: friction is elastic before it slides. What leads there is motion.
     """
     per = (2 * np.pi) ** 2 * bandwidth.state_cutoff**3 / 3.0
     noise, now = (np.sqrt(per * x) for x in (raw.noise_density, _density(raw, motion, bandwidth)))
