@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -147,6 +147,7 @@ def replays(motion: ObservedMotion, trim: int, gains: Gains | None, longest: flo
     """Return each replay that has a window and is not too long, the whole if others are not.
 
     In closed loop, which users of position control see, there is one of two seconds in any case.
+    It is where most moves: recordings begin at rest.
     """
     end = motion.starts[1] if len(motion.starts) > 1 else len(motion.time)
     least = longest if gains is None else max(longest, *_HORIZONS_S.values())
@@ -157,10 +158,22 @@ def replays(motion: ObservedMotion, trim: int, gains: Gains | None, longest: flo
             found.append((name, cut(motion, trim, horizon), None))
     if whole > 0.0 and max(_HORIZONS_S.values()) <= least:
         windows = cut(motion, trim, whole)
-        one = RolloutWindows(motion, windows.first[:1], windows.stride, windows.steps)
+        one = replace(windows, first=windows.first[_liveliest(windows)])
         # under the efforts of a drive alone, every model soon leaves what that drive followed
         found.append(('open_whole' if gains is None else 'closed_whole', one, gains))
     return [(name, windows, g) for name, windows, g in found if len(windows.first)]
+
+
+def _liveliest(windows: RolloutWindows) -> slice:
+    """Return the window in which joints move most, each relative to its usual speed."""
+    if not len(windows.first):
+        return slice(0)
+    squares = windows.motion.velocity**2
+    squares = (squares / np.maximum(squares.mean(axis=0), 1e-300)).sum(axis=1)
+    until = np.append(0.0, np.cumsum(squares))
+    last = np.minimum(windows.first + windows.steps * windows.stride, len(squares))
+    best = int(np.argmax(until[last] - until[windows.first]))
+    return slice(best, best + 1)
 
 
 def _replayed(

@@ -227,6 +227,19 @@ def test_replays_of_a_stiff_model_are_the_short_ones(equations_for, perfect):
     assert shown == {10.0: ['open_0.5', 'open_2', 'open_whole'], 1.0: ['open_0.5']}
 
 
+def test_the_long_replay_shows_where_most_moves(equations_for, perfect):
+    """A recording may begin at rest, of which a simulation says nothing."""
+    _, equations = equations_for(perfect[1])
+    motion, half = equations.motion, len(equations.motion.time) // 2
+    for calm in (slice(half), slice(half, None)):
+        velocity = motion.velocity.copy()
+        velocity[calm] = 0.0
+        *_, (name, windows, _) = replays(replace(motion, velocity=velocity), TRIM, None, 2.0)
+        assert name == 'open_whole'
+        assert len(windows.first) == 1
+        assert bool(windows.rows[0, -1] > half) is (calm.start is None)
+
+
 def test_windows_follow_each_other_and_cross_no_pause(equations_for, perfect):
     """No sample in two windows, none near the ends of a stretch, all of the horizon's length."""
     _, equations = equations_for(perfect[1])
