@@ -178,6 +178,14 @@ def grown(columns: Columns, model: Model, block: Block) -> Model:
         model = better
 
 
+def grown_at(columns: Columns, model: Model, joints: set[int]) -> Model:
+    """Add the effects of some joints that are worth their price."""
+    for block in blocks_of(model):
+        if joints & set(block.joints or ()):
+            model = grown(columns, model, block)
+    return model
+
+
 def _counted(columns: Columns, model: Model, block: Block) -> list[Model]:
     """Return the models with each of the best candidates that are large enough to count."""
     left, strain = block.left(model), model.strain
@@ -230,9 +238,9 @@ def in_common(columns: Columns, model: Model) -> Iterator[Model]:
     motion = model.frame.equations.motion
     late = [s for s in model.effects if s.effect.stage and s.effect.quantities[0].unit == 's'
             and s.place.joint >= 0]  # fmt: skip
-    laws = [e for e in motion.catalogue.values() if e.takes_all and e.places(motion)]
     if not late:
         return
+    laws = [e for e in motion.catalogue.values() if e.takes_all]
     kept = tuple(s for s in model.effects if s not in late)
     without = refitted(columns, model, (kept, len(kept)))
     found = [x for x in screen(columns, without, laws) if x[1].place.joint == PLACES['all']]
@@ -241,9 +249,7 @@ def in_common(columns: Columns, model: Model) -> Iterator[Model]:
         may = tuple(x for x in trial.effects if x.is_possible(motion))
         if len(may) < len(trial.effects):  # they made up for a part of it
             trial = refitted(columns, trial, (may, len(may)))
-        for block in blocks_of(trial):
-            trial = grown(columns, trial, block) if block.joints else trial
-        yield trial
+        yield grown_at(columns, trial, {*range(motion.tree.size)})
 
 
 def two_for_one(columns: Columns, model: Model) -> Iterator[Model]:

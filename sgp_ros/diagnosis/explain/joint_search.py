@@ -26,6 +26,7 @@ from sgp_ros.diagnosis.explain.growth import (
     blocks_of,
     elsewhere,
     grown,
+    grown_at,
     in_common,
     refitted,
     two_for_one,
@@ -252,16 +253,8 @@ def coupled(columns: Columns, model: Model) -> Iterator[Model]:
             found = screen(columns, trial, [s.effect], block.joints)
             for best in distinct([t for t in found if t[1].place == s.place], 1):
                 trial = refitted(columns, trial, (kept, len(kept)), best)
-                yield _grown_at(columns, trial, ends)
+                yield grown_at(columns, trial, ends)
     yield from _differentials(columns, model)
-
-
-def _grown_at(columns: Columns, model: Model, joints: set[int]) -> Model:
-    """Add the effects of some joints that are worth their price."""
-    for block in blocks_of(model):
-        if joints & set(block.joints or ()):
-            model = grown(columns, model, block)
-    return model
 
 
 def _is_part(other: EffectAt, coupled: EffectAt, ends: set[int]) -> bool:
@@ -294,4 +287,4 @@ def _differentials(columns: Columns, model: Model) -> Iterator[Model]:
         for kept in dict.fromkeys((others, others + plain)):
             trial = refitted(columns, model, (kept, len(kept)), *motors)
             if gain(trial, usually, is_whole=False) > 0.0:
-                yield _grown_at(columns, trial, ends)
+                yield grown_at(columns, trial, ends)
