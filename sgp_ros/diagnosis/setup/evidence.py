@@ -173,14 +173,15 @@ class Probe:
         volume = float(noisy_volume(units, self._noise_part).sum())
         rows = min(INDEPENDENT_ROWS, len(d))
         size, p = FRICTION * rms, whole.bodies.shape[2]
-        products = [c.products(x, size) for c, x in zip(columns, both, strict=True)]
+        products = [whole.products(d, size)]
+        products.append(products[0] if held is whole else held.products(both[1], size))
+        own = [np.minimum(x.squares / power, 1.0) for x in products]
         tried: list[tuple[float, int, Explained]] = []
         usual = OF_BODIES if self._rotors is None else OF_ROTORS
         for number in usual if unknowns is None else (unknowns,):
             kind = SETS[number]
             i = int(kind.level >= 2)
-            own = np.minimum(products[i].squares / power, 1.0)
-            floor = self._floor(own if nominal is None else nominal) * power
+            floor = self._floor(own[i] if nominal is None else nominal) * power
             precision = self._loads[kind.accuracy] if kind.level == 3 else None
             found = explained(products[i], kind, power, floor, rows, precision)
             tried.append((found.evidence - kind.price * (self._rotors is None), number, found))
@@ -192,9 +193,8 @@ class Probe:
         worth, number, best = max(counted, key=lambda t: t[0])
         i = int(SETS[number].level >= 2)
         rest = (both[i] - columns[i].force(best.b, size)) / rms
-        own, share = np.minimum(products[i].squares / power, 1.0), best.variance / power
-        left = (rest**2).mean(axis=0)
-        return Agreement(worth, number, left, both[i] / rms, rest, share, rows, own)
+        left, share = (rest**2).mean(axis=0), best.variance / power
+        return Agreement(worth, number, left, both[i] / rms, rest, share, rows, own[i])
 
     def _shift(
         self, motion: ObservedMotion, correction: Correction, volume: float, w: np.ndarray
