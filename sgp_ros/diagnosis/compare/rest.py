@@ -37,11 +37,9 @@ def resting(raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwidth) ->
     for j in range(motion.velocity.shape[1]):
         q, speed = motion.position[:, j], np.abs(motion.velocity[:, j])
         push = np.abs(motion.acceleration[:, j]) / max(float(pushes[j]), 1e-300)
-        least = _SLOW * float(typical[j])
-        noisy = _NOISES * np.minimum(
-            noise[j], np.maximum(now[:, j], _CREEP * typical[j] / _NOISES)
-        )
-        surely, perhaps = np.maximum(noisy, least), np.maximum(noisy, _CREEP * typical[j])
+        least, creep = (x * float(typical[j]) for x in (_SLOW, _CREEP))
+        noisy = np.minimum(_NOISES * noise[j], np.maximum(_NOISES * now[:, j], creep))
+        surely, perhaps = np.maximum(noisy, least), np.maximum(noisy, creep)
         slow = _slow(speed, surely, shortest)
         slow += [x for x in _slow(speed, perhaps, shortest) if np.ptp(q[x]) < _NARROW * np.ptp(q)]
         for part in slow:
