@@ -166,11 +166,6 @@ class Probe:
         both = d, d if held is whole else held.nominal - self.filter(acting * moving)
         power = self._delivered(motion, correction)
         rms = np.sqrt(power)
-        # by how much the density of recorded accelerations exceeds that of relative errors
-        units = -0.5 * self.driven * np.log(power / self.power)
-        if not self._loop.is_closed:
-            units = units - np.log(np.abs(correction.scale))
-        volume = float(noisy_volume(units, self._noise_part).sum())
         rows = min(INDEPENDENT_ROWS, len(d))
         size, p = FRICTION * rms, whole.bodies.shape[2]
         products = [whole.products(d, size)]
@@ -185,7 +180,7 @@ class Probe:
             precision = self._loads[kind.accuracy] if kind.level == 3 else None
             found = explained(products[i], kind, power, floor, rows, precision)
             tried.append((found.evidence - kind.price * (self._rotors is None), number, found))
-        shift = partial(self._shift, motion, correction, volume)
+        shift = partial(self._shift, motion, correction, power)
         if self.full.has_all_efforts:  # inertia does not change what is best
             tried.sort(key=lambda t: -t[0])
             tried = [next((t for t in tried if np.isfinite(shift(t[2].b[:p]))), tried[0])]
@@ -197,16 +192,27 @@ class Probe:
         return Agreement(worth, number, left, both[i] / rms, rest, share, rows, own[i])
 
     def _shift(
-        self, motion: ObservedMotion, correction: Correction, volume: float, w: np.ndarray
+        self, motion: ObservedMotion, correction: Correction, power: np.ndarray, w: np.ndarray
     ) -> float:
-        """Return the evidence of the inertia of bodies w by row; -inf where none can be so."""
+        """Return the evidence of the inertia of bodies w by row; -inf where none can be so.
+
+        With by how much the density of recorded motions exceeds that of relative errors. Gains of
+        drives that hold positions are stated in the unit in which these are recorded.
+        """
         inertia = self._log_inertia(motion.tree, w, motion.position[self._pose])
-        if self._loop.is_closed:  # gains are stated in the unit of the recorded positions
-            inertia = inertia - np.log(np.abs(correction.scale))
+        units, scale = (
+            -0.5 * self.driven * np.log(power / self.power),
+            np.log(abs(correction.scale)),
+        )
+        if self._loop.is_closed:
+            inertia = inertia - scale
+        else:
+            units = units - scale
         shift = float(self._loop.volume(inertia, correction.kp, correction.kd).sum())
         if not np.isfinite(shift):
             return shift
-        return 0.0 if self.full.has_all_efforts else shift + volume
+        volume = noisy_volume(units, self._noise_part).sum()
+        return 0.0 if self.full.has_all_efforts else shift + float(volume)
 
     def _delivered(self, motion: ObservedMotion, correction: Correction) -> np.ndarray:
         """Return the size of the efforts to which errors are relative, (k,) mean squares.

@@ -83,18 +83,19 @@ def test_less_of_a_rotor_than_stated_may_be(slow):
 
 @pytest.mark.parametrize('gain', [0.0, 1e5, 401.0])
 def test_another_unit_of_positions_is_no_prize_where_a_drive_is_stiff(gain):
-    """Its gains are stated in that unit; where efforts are given it is counted elsewhere."""
+    """Its gains are stated in that unit; given efforts are one, as the inertia is."""
     loop = Loop(np.ones(1), gain * np.ones(1), np.zeros(1), np.linspace(0.1, 12.0, 100))
     probe = SimpleNamespace(
         _loop=loop, _pose=slice(0), _log_inertia=lambda *_: np.zeros(1),
-        full=SimpleNamespace(has_all_efforts=False),
+        full=SimpleNamespace(has_all_efforts=False), driven=np.ones(1), power=np.ones(1),
+        _noise_part=np.zeros(1),
     )  # fmt: skip
     motion = SimpleNamespace(tree=None, position=np.zeros((1, 1)))
     halved = replace(Correction.none(1), scale=np.full(1, 0.5))
-    shift = Probe._shift(probe, motion, halved, 0.0, np.zeros(1))
+    shift = Probe._shift(probe, motion, halved, np.ones(1), np.zeros(1))
     expected = np.log(np.abs(gain - 2.0 * loop.omega**2) / np.abs(gain - loop.omega**2)).mean()
-    assert shift == pytest.approx(expected if gain else 0.0, abs=1e-6)
-    assert abs(shift) < 0.01 or gain == 401.0
+    assert shift == pytest.approx(expected, abs=1e-6)
+    assert abs(shift) < 0.01 or gain < 1e5
 
 
 def test_where_forces_cancel_their_accuracy_counts(slow, tmp_path, monkeypatch):
