@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sgp_ros.diagnosis import wrong_bodies
 from sgp_ros.diagnosis.wrong_bodies import (
     _changed,
     _numbers,
@@ -46,14 +47,20 @@ def test_two_wrong_bodies_are_not_told_as_one(equations_for):
     assert not alone
 
 
-def test_numbers_that_trade_are_told_as_such(equations_for):
-    """A heavier second body, or one with its centre further out, and a first one like it."""
+@pytest.mark.parametrize('beside', [1.0, 1.2])
+def test_numbers_that_trade_are_told_as_such(monkeypatch, equations_for, beside):
+    """A heavier second body, or one with its centre further out, and a first one like it.
+
+    With the number of the model itself, whatever it is beside offsets of the efforts.
+    """
     first, second = CHAINS[2]
     chain = replace(first, mass=1.5 * first.mass), replace(second, centre=1.3 * second.centre)
     _, equations = equations_for(simulate(chain, 5))
     names = equations.motion.tree.link_names
     model = fitted(equations, is_free=True)
-    (said,) = traded_remarks(equations, model, parameter_errors(equations, model))
+    errors = parameter_errors(equations, model)
+    monkeypatch.setattr(wrong_bodies, '_with_offsets', lambda _, m: replace(m, w=beside * m.w))
+    (said,) = traded_remarks(equations, model, errors)
     centre = re.search(
         f'z of the centre of mass of {names[1]} -([0-9.]+) instead of -0.15 m', said
     )

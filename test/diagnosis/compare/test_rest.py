@@ -66,6 +66,13 @@ def test_a_slow_reversal_is_no_rest_because_stamps_of_fast_motions_jitter():
     assert found[1850:2550].mean() < 0.1
 
 
+def test_what_creeps_rests_in_a_noisy_recording_however_quiet_it_is_itself():
+    """At half a hundredth of the usual speed, over more than friction gives way."""
+    speed, slow = swings(np.full(2000, 0.003))
+    assert rests(speed, jitter=0.002)[slow].mean() > 0.9
+    assert not rests(speed)[slow].any()
+
+
 def test_a_joint_that_slows_down_moves_until_it_stands():
     """Jitter of stamps makes a noise of fast motions, which is none of the stop."""
     slowing = np.linspace(1.0, 0.0, 200)

@@ -46,7 +46,7 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import are_apart, distinct, screen
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt, one_of_each
-from sgp_ros.physics.place import Place, joint_name
+from sgp_ros.physics.place import PLACES, Place, joint_name
 from test.diagnosis.worlds import CHAINS, heavier, recorded, simulate
 from test.simulation.trees import arm
 
@@ -323,10 +323,13 @@ def test_a_delay_of_all_motors_takes_the_place_of_what_imitates_it_at_each(tmp_p
     """A lag at one, a delay of its own at another; what made up for a part of it goes."""
     raw, tree = recorded(tmp_path, arm(), ['command_delay:joint=all,delay=0.03'], seconds=6.0)
     columns, base = _start(make_equations(raw, tree, choose_bandwidth(raw, tree)))
-    apart = ('actuator_lag', 0, [0.03]), ('command_delay', 1, [0.03]), ('spring', 0, [])
+    apart = [('actuator_lag', 0, [0.03]), ('command_delay', 1, [0.03])]
+    apart += [(name, j, []) for name in ('viscous_friction', 'coulomb_friction') for j in (0, 1)]
     effects = tuple(EffectAt(EFFECTS[n], Place(j), np.array(x)) for n, j, x in apart)
     wrong = fit(columns, effects, base.sigma, is_free=False)
     (found,) = in_common(columns, wrong)
+    assert is_credible(found)
+    assert ('command_delay', PLACES['all']) in _keys(by_joint(columns, wrong)[0])
     delay = next(s for s in found.effects if s.name == 'command_delay')
     assert joint_name(base.frame.equations.motion, delay.place.joint) == 'all'
     assert delay.shape[0] == pytest.approx(0.03, rel=0.05)

@@ -687,6 +687,19 @@ def test_what_stands_beside_a_refused_formula_is_part_of_the_decision(monkeypatc
     assert std.keys() == model.key
 
 
+def test_no_friction_is_looked_for_beside_a_refused_formula_of_the_own_speed(
+    monkeypatch, equations_for
+):
+    """It may be a part of that force, however it is fitted."""
+    force = lambda _t, q, v: (-0.05 * max(v[0], 0.0) ** 2,)  # noqa: E731 - a world
+    _, equations = equations_for(simulate(CHAINS[1], 9, 20.0, force=force))
+    comparison = compare_models(equations, lambda _share: None)
+    monkeypatch.setattr(assertion, '_objection', lambda *_: 'it is not asked for')
+    found = with_laws(equations, comparison, decide(equations, comparison))
+    assert found.decision.unknown == (0,)
+    assert not found.decision.shaped[0][1]
+
+
 def test_an_everyday_law_that_does_not_count_as_physics_is_not_told(monkeypatch, equations_for):
     """However small what is left beside it."""
     found, columns, scale = _shaped(equations_for(_sprung())[1], _RUBBED)
