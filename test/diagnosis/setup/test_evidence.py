@@ -96,6 +96,9 @@ def test_another_unit_of_positions_is_no_prize_where_a_drive_is_stiff(gain):
     expected = np.log(np.abs(gain - 2.0 * loop.omega**2) / np.abs(gain - loop.omega**2)).mean()
     assert shift == pytest.approx(expected, abs=1e-6)
     assert abs(shift) < 0.01 or gain < 1e5
+    probe._noise_part = np.ones(1)  # of measured efforts, which no unit of the motion changes
+    noisy = Probe._shift(probe, motion, halved, np.ones(1), np.zeros(1))
+    assert noisy == pytest.approx(shift if gain else 0.0)
 
 
 def test_where_forces_cancel_their_accuracy_counts(slow, tmp_path, monkeypatch):
