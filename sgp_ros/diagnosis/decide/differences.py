@@ -82,7 +82,9 @@ def decide_several(
     if count == 1:
         return Several(equations, comparison, decision, decision.model, {})
     search = _Search(Columns(equations), Scale.of(equations, comparison), count)
-    model = _start(comparison, decision, search.scale)
+    # the best common model, adequate or not: differences may spoil it
+    models = (comparison.base, *comparison.singles, *comparison.pairs, *comparison.more)
+    model = max((decision.model, *models), key=search.scale.worth)
     is_explained = decision.verdict != 'unexplained'
     if is_explained:
         model = search.extended(model)
@@ -104,12 +106,6 @@ def decide_several(
     if decision.verdict == 'unexplained':  # what is unknown may differ by chance
         chances = {key: min(p, DOUBTED) for key, p in chances.items()}
     return Several(left, comparison, decision, model, chances)
-
-
-def _start(comparison: Comparison, decision: Decision, scale: Scale) -> Model:
-    """Return the best common model, adequate or not: differences may spoil it."""
-    models = (comparison.base, *comparison.singles, *comparison.pairs, *comparison.more)
-    return max((decision.model, *models), key=scale.worth)
 
 
 def force_of(model: Model, some: tuple[EffectAt, ...]) -> np.ndarray:
@@ -165,7 +161,8 @@ class _Search:
                       *self._fewer(model)]  # fmt: skip
             for r in range(self.count):
                 trials += self._added(model, r)
-            possible = (m for m in trials if m.is_possible() and np.isfinite(m.score))
+            known = map(self.possible, trials)
+            possible = (m for m in known if m.is_possible() and np.isfinite(m.score))
             worth, least = {m: self.worth(m) for m in possible}, self.worth(model) + ALIKE
             better = sorted((m for m in worth if worth[m] > least), key=lambda m: -worth[m])
             if (best := next(filter(self._holds, better), None)) is None:
@@ -230,13 +227,14 @@ class _Search:
         return [self.fitted(model, (*model.effects, s)) for s in list(found.values())[:TRIED]]
 
     def _moved(self, model: Model) -> list[Model]:
-        """Return the model with a common law moved into one recording."""
+        """Return the model with a law moved into one recording, or from it into another."""
         found = []
         for i, s in enumerate(model.effects):
-            if isinstance(s.effect, InRecording) or not may_differ(s.effect):
+            law = s.effect.law if isinstance(s.effect, InRecording) else s.effect
+            if not may_differ(law):
                 continue
             for r in range(self.count):
-                there = replace(s, effect=InRecording(s.effect, r))
+                there = replace(s, effect=InRecording(law, r))
                 if there.key not in model.key:
                     others = (*model.effects[:i], *model.effects[i + 1 :])
                     found.append(self.fitted(model, (*others, there)))

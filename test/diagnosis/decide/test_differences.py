@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -124,9 +124,10 @@ class _Worth:
     name: str
     size: float
     score: float = 0.0
+    is_real: bool = True
 
     def is_possible(self):
-        return True
+        return self.is_real
 
 
 def test_a_difference_that_does_not_count_hides_no_other(monkeypatch):
@@ -136,9 +137,36 @@ def test_a_difference_that_does_not_count_hides_no_other(monkeypatch):
     more = {'none': ['slight', 'clear']}
     fakes = {
         '_added': lambda _, m, _recording: [models[n] for n in more.get(m.name, [])],
-        'worth': lambda _, m: m.size, '_holds': lambda _, m: m.name == 'clear',
-        **dict.fromkeys(('_moved', '_shared', '_simpler', '_fewer'), lambda *_: []),
+        '_holds': lambda _, m: m.name == 'clear', 'possible': lambda _, m: m,
     }  # fmt: skip
-    for name, fake in fakes.items():
-        monkeypatch.setattr(differences._Search, name, fake)
+    _fake(monkeypatch, **fakes)
     assert search.extended(models['none']) is models['clear']
+
+
+def _fake(monkeypatch, **fakes):
+    """Give the search these methods, and no others that try a model."""
+    nothing = dict.fromkeys(('_added', '_moved', '_shared', '_simpler', '_fewer'), lambda *_: [])
+    for name, fake in (nothing | {'worth': lambda _, m: m.size} | fakes).items():
+        monkeypatch.setattr(differences._Search, name, fake)
+
+
+def test_a_difference_is_tried_beside_the_plain_law_of_one_it_makes_impossible(monkeypatch):
+    """Friction that took the load for its own is no reason to leave the load common."""
+    none, plain = _Worth('none', 0.0), _Worth('plain', 5.0)
+    driving = replace(_Worth('driving', 9.0), is_real=False)
+    _fake(
+        monkeypatch, _moved=lambda _, m: [driving] if m is none else [],
+        possible=lambda _, m: plain if m is driving else m, _holds=lambda *_: True,
+    )  # fmt: skip
+    assert differences._Search(None, None, 2).extended(none) is plain
+
+
+def test_a_law_of_one_recording_may_be_one_of_another(monkeypatch):
+    monkeypatch.setattr(differences._Search, 'fitted', lambda _self, _model, effects: effects)
+    dry, cold = _at('coulomb_friction', [1.0]), InRecording(EFFECTS['coulomb_friction'], 0)
+    there = EffectAt(cold, Place(0), coefficients=np.array([0.3]))
+    model = SimpleNamespace(effects=(dry, there), key=frozenset({dry.key, there.key}))
+    found = {tuple(s.name for s in x) for x in differences._Search(None, None, 2)._moved(model)}
+    name = dry.name
+    assert (name, f'{name} in 1') in found  # less there instead of more here
+    assert (f'{name} in 0', f'{name} in 1') in found
