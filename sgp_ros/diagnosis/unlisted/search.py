@@ -1,9 +1,9 @@
 """The search for a law at a joint that listed effects do not describe, or describe only nearly.
 
 First a smooth force of one variable, with a factor in another, takes the place of effects of the
-joint, alone and beside those that may be right. Where none is worth more than the listed ones, no
-law is looked for. Else the formulas of the best variables and factors are fitted, each jointly
-with the bodies and all other effects, as every other model is.
+joint, alone and beside those that may be right. Where none is worth more than the listed ones, or
+would be with few numbers, no law is looked for. Else the formulas of the best variables and
+factors are fitted, each jointly with the bodies and all other effects, as every other model is.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sgp_ros.diagnosis.criteria import ALIKE, CLEARER, PER_PARAMETER
+from sgp_ros.diagnosis.criteria import ALIKE, CLEARER
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model
@@ -50,12 +50,15 @@ from sgp_ros.diagnosis.unlisted.tried import (
     leaves_less,
     more_forces,
     smooth_forces,
+    spared_by,
     times_law,
     weighted,
     without_limits,
 )
 from sgp_ros.diagnosis.unlisted.variables import Variable
+from sgp_ros.physics.catalogue import ARMATURE
 from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.place import Place
 
 SMOOTH, SHAPES, FIRST, FITTED = 3, 4, 12, 5
 """Smooth forces fitted beside each choice of kept effects; of all of these, those for which
@@ -93,7 +96,7 @@ def search(
     # of a product of two variables, one alone may say little
     for number, model in enumerate(look.shapes(smooth)[: None if wanted else 1]):
         best = max(map(scale.worth, laws.values()), default=-np.inf)
-        if scale.worth(model) + look.most_spared(model) < best:
+        if scale.worth(model) + spared_by(model, joint) + ALIKE < best:
             continue
         for law in look.formulas(model, FITTED if number else FIRST):
             key = law.key, law.is_free
@@ -134,7 +137,7 @@ class _Look:
         Forces of two joints, or of the past, are kept only if worth more than any plain one.
         """
         found = self.best(m for m in self.smooth() if not smooth_at_bound(m, self.joint))
-        found = self.best([*found, *self.more(found[0])]) if found else []
+        found = self.best([*found, *(self.more(found[0]) if found else ())])
         finer = (self._finer(m, x) for m, x in beside_each(found, self.joint)[:SHAPES])
         found = self.best([*found, *finer])
         plain = [self.scale.worth(m) for m in found if self._variable(m).is_plain]
@@ -142,7 +145,7 @@ class _Look:
         return [m for m in found if self._variable(m).is_plain or self.scale.worth(m) > least]
 
     def best(self, models: Iterable[Model]) -> list[Model]:
-        """Return models, those that are worth most first."""
+        """Return models, the best first."""
         return sorted(models, key=lambda m: -self.scale.worth(m))
 
     def _variable(self, model: Model) -> Variable:
@@ -205,9 +208,7 @@ class _Look:
             weights = [added[2] * x for x in (1.0 - step, 1.0 + step)]
             near = [weighted(motion, self.joint, added[0], force.variable.kind, w, force.gate)
                     for w in weights]  # fmt: skip
-            for found in self._fitted(base, near, None):
-                if self.scale.worth(found) > self.scale.worth(best):
-                    best = found
+            best = max((best, *self._fitted(base, near, None)), key=self.scale.worth)
         return best
 
     def free(self, model: Model) -> np.ndarray:
@@ -252,10 +253,6 @@ class _Look:
         return fit(self.columns, effects, model.sigma, is_free=model.is_free, w=model.w, rounds=2,
                    steps=4, still=len(effects))  # fmt: skip
 
-    def most_spared(self, smooth: Model) -> float:
-        """Return by how much a formula may be worth more than a smooth force, by its price."""
-        return PER_PARAMETER * len(smooth_of(smooth, self.joint)[0].coefficients) + ALIKE
-
     def formulas(self, smooth: Model, count: int) -> Iterator[Model]:
         """Yield models with so many formulas in place of the smooth force of a model."""
         placed, chosen = smooth_of(smooth, self.joint)
@@ -283,11 +280,15 @@ class _Look:
     def _bases(self) -> Iterator[Model]:
         """Yield models of all other joints with some of the effects of this one.
 
-        With bodies as in the robot's file, and free.
+        With bodies as in the file, and free; with a rotor for loads, which may imitate the law.
         """
-        for is_free in (False, True):
-            for kept in beside(self.listed, self.joint, is_open=self.is_open):
-                yield self._without((*self._others(), *kept), is_free=is_free)
+        others, rotor = self._others(), EffectAt(ARMATURE, Place(self.joint))
+        plain = tuple(s for s in others if not s.effect.is_body)
+        for more in dict.fromkeys([others, (*plain, rotor) if plain != others else others]):
+            for is_free in (False, True):
+                for kept in beside(self.listed, self.joint, is_open=self.is_open):
+                    unique = {s.key: s for s in (*more, *kept)}
+                    yield self._without(tuple(unique.values()), is_free=is_free)
 
     def _others(self) -> tuple[EffectAt, ...]:
         own = own_effects(self.listed, self.joint)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from sgp_ros.diagnosis.criteria import ALIKE, NEARLY
+from sgp_ros.diagnosis.criteria import ALIKE, NEARLY, PER_PARAMETER
 from sgp_ros.diagnosis.decide.everyday import SHORTEST_LAG
 from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.fitted_model import Model
@@ -30,6 +30,7 @@ from sgp_ros.diagnosis.unlisted.shapes import (
     PIECES,
     LawAsFactor,
     SmoothForce,
+    smooth_of,
 )
 from sgp_ros.diagnosis.unlisted.variables import LEAD, SLIP, STRETCH, Variable
 from sgp_ros.physics.effect_at import EffectAt
@@ -91,22 +92,29 @@ def is_wanted(
 ) -> bool:  # fmt: skip
     """Return whether a formula is looked for in place of listed effects of a joint.
 
-    It is where a smooth force beats them by more than a trifle, and for waves in whole ratios.
+    It is where a smooth force beats them by more than a trifle, or would if its numbers, of which
+    a formula has few, cost nothing; and for waves in whole ratios.
     """
     is_trifle = smooth.mean_square[joint] > NEARLY**2 * listed.mean_square[joint]
     is_trifle = is_trifle and is_slight(listed, smooth, joint)
-    is_better = is_beaten(scale, listed, smooth, joint) and not is_trifle
+    spared = spared_by(smooth, joint) if leaves_less(smooth, listed, joint) else 0.0
+    is_better = is_beaten(scale, listed, smooth, joint, spared) and not is_trifle
     motion = columns.equations(frozenset()).motion
     is_asked = is_better or is_series(own_effects(listed, joint), motion)
     return is_asked and not is_creep(columns, scale, listed, smooth, joint)
 
 
-def is_beaten(scale: Scale, listed: Model, smooth: Model, joint: int) -> bool:
+def spared_by(smooth: Model, joint: int) -> float:
+    """Return the price of the numbers of a smooth force: what a formula may spare of it [nats]."""
+    return PER_PARAMETER * len(smooth_of(smooth, joint)[0].coefficients)
+
+
+def is_beaten(scale: Scale, listed: Model, smooth: Model, joint: int, spared: float = 0.0) -> bool:
     """Return whether a smooth force is worth more than listed effects, and not for a trifle.
 
-    It leaves clearly less, or one of them was distorted to imitate it.
+    It leaves clearly less, or one of them was distorted to imitate it; `spared` of its price.
     """
-    is_worth = scale.worth(smooth) > scale.worth(listed) + ALIKE
+    is_worth = scale.worth(smooth) + spared > scale.worth(listed) + ALIKE
     return is_worth and (leaves_less(smooth, listed, joint) or is_bent(listed, smooth, joint))
 
 

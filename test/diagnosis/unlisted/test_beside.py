@@ -13,7 +13,8 @@ from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import compare_models
 from sgp_ros.diagnosis.explain.regression import Columns
-from sgp_ros.diagnosis.unlisted import beside
+from sgp_ros.diagnosis.unlisted import beside, tried
+from sgp_ros.diagnosis.unlisted import search as searching
 from sgp_ros.diagnosis.unlisted.beside import acts_as_bodies, is_bent, is_creep, is_slight
 from sgp_ros.diagnosis.unlisted.shapes import FINE, SmoothForce
 from sgp_ros.diagnosis.unlisted.tried import smooth_forces
@@ -188,3 +189,41 @@ def test_other_bodies_take_the_place_of_a_load_beside_a_formula(monkeypatch, rar
     found = beside.earned(None, scale, start, 0)
     assert found.is_free is (rare == 'payload')
     assert (found is start) is (rare != 'payload')
+
+
+@pytest.mark.parametrize('rare', ['payload', 'tip_force'])
+def test_a_rotor_is_tried_in_the_place_of_a_load(monkeypatch, rare):
+    """Beside a law that is not known yet, the weight of a load may have imitated it."""
+    load, dry = EffectAt(EFFECTS[rare], Place(-2)), EffectAt(EFFECTS['coulomb_friction'], Place(0))
+    monkeypatch.setattr(
+        searching._Look, '_without', lambda _self, kept, *, is_free: (kept, is_free)
+    )
+    look = searching._Look(None, None, SimpleNamespace(effects=(load, dry)), 0, is_open=False)
+    tried = {(frozenset(s.name for s in kept), free) for kept, free in look._bases()}
+    for is_free in (False, True):
+        assert (frozenset({rare, 'coulomb_friction'}), is_free) in tried
+        with_rotor = (frozenset({'armature', 'coulomb_friction'}), is_free)
+        assert (with_rotor in tried) is EFFECTS[rare].is_body
+
+
+@pytest.mark.parametrize(
+    ('left', 'worth', 'is_asked'),
+    [(0.1, 40.0, True), (0.1, 10.0, False), (0.5, 40.0, False), (0.5, 70.0, True)],
+)
+def test_a_formula_is_looked_for_where_it_may_be_worth_more_than_a_spline(
+    monkeypatch, left, worth, is_asked
+):
+    """If the spline leaves much less: of its numbers a formula has few."""
+    fakes = {
+        'is_slight': False, 'is_bent': True, 'is_creep': False, 'is_series': False,
+        'own_effects': (), 'smooth_of': (SimpleNamespace(coefficients=np.zeros(9)), None),
+    }  # fmt: skip
+    for name, found in fakes.items():
+        monkeypatch.setattr(tried, name, lambda *_, found=found: found)
+    listed, smooth = (
+        SimpleNamespace(mean_square=np.array([x]), worth=w)
+        for x, w in ((1.0, 50.0), (left, worth))
+    )
+    columns = SimpleNamespace(equations=lambda _: SimpleNamespace(motion=None))
+    scale = SimpleNamespace(worth=lambda m: m.worth)
+    assert tried.is_wanted(columns, scale, listed, smooth, 0) is is_asked
