@@ -27,6 +27,7 @@ from sgp_ros.diagnosis.criteria import (
 from sgp_ros.diagnosis.gathered import Recordings
 from sgp_ros.diagnosis.refining import refined
 from sgp_ros.diagnosis.result import Equivalent
+from sgp_ros.diagnosis.setup.connection import Connection, Tried
 from sgp_ros.diagnosis.setup.errors import EFFORT_SCALE
 from sgp_ros.diagnosis.setup.evidence import Probe
 from sgp_ros.diagnosis.setup.said import (
@@ -36,7 +37,7 @@ from sgp_ros.diagnosis.setup.said import (
     price_of,
     setup_advice,
 )
-from sgp_ros.diagnosis.setup.search import Connection, Tried, search
+from sgp_ros.diagnosis.setup.search import search
 from sgp_ros.diagnosis.unlisted.statement import extended
 from sgp_ros.physics.catalogue import TORQUE_GAIN
 from sgp_ros.physics.place import joint_name
@@ -84,7 +85,7 @@ def connect(recordings: Recordings, tree: Tree, progress: Callable[[float], None
             return known
     found = clear(search(Probe(recordings.learned, tree, bandwidth)))
     if not known.findings:
-        return _connected(plain, found, tree, each)
+        return _connected(known, found, tree, each)
     # what other bodies leave is too small to tell them from other gains
     return _beside(plain, by_gains.errors, 0.0) if found.is_enough else known
 

@@ -24,8 +24,8 @@ from sgp_ros.diagnosis.connected import Connected
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.frame import Frame
 from sgp_ros.diagnosis.explain.regression import Columns, dry_joints
+from sgp_ros.diagnosis.setup.connection import Connection, Tried, undoing
 from sgp_ros.diagnosis.setup.errors import EFFORT_SCALE
-from sgp_ros.diagnosis.setup.search import Connection, Tried, undoing
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.observed_motion import ObservedMotion
 

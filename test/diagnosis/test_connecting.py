@@ -12,8 +12,8 @@ from sgp_ros.diagnosis import connecting
 from sgp_ros.diagnosis.connected import Connected
 from sgp_ros.diagnosis.connecting import in_halves
 from sgp_ros.diagnosis.criteria import ALIKE
+from sgp_ros.diagnosis.setup.connection import Connection, Tried
 from sgp_ros.diagnosis.setup.correction import Correction
-from sgp_ros.diagnosis.setup.search import Connection, Tried
 from sgp_ros.physics.catalogue import TORQUE_GAIN
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.place import Place

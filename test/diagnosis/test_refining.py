@@ -19,9 +19,9 @@ from sgp_ros.diagnosis.explain.fitted_model import first_scale
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.gathered import Recordings
 from sgp_ros.diagnosis.refining import refined
+from sgp_ros.diagnosis.setup.connection import Connection, Tried
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.errors import hypotheses
-from sgp_ros.diagnosis.setup.search import Connection, Tried
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.place import Place

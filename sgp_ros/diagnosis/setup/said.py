@@ -22,8 +22,8 @@ from sgp_ros.diagnosis.criteria import (
     TEMPER,
 )
 from sgp_ros.diagnosis.result import Equivalent, Finding, Location, Parameter
+from sgp_ros.diagnosis.setup.connection import Connection, Tried
 from sgp_ros.diagnosis.setup.errors import EFFORT_SCALE
-from sgp_ros.diagnosis.setup.search import Connection, Tried
 from sgp_ros.physics.catalogue import TORQUE_GAIN
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.motion import Structure

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy import optimize
 
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, PER_EFFECT, PER_PARAMETER, SLIGHT_REST
+from sgp_ros.diagnosis.setup.connection import Connection, Rivals, Tried, price_of_one, undoing
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.errors import Hypothesis, hypotheses
 from sgp_ros.diagnosis.setup.evidence import Probe
@@ -23,72 +24,6 @@ _FAR = 300.0
 """Evidence that a start may lack and still be looked at [nats]."""
 
 
-@dataclass(frozen=True, eq=False)
-class Tried:
-    """A hypothesis with its numbers.
-
-    Attributes:
-        hypothesis: what is wrong.
-        numbers: (m,) [units of the hypothesis].
-        std: (m,) standard deviations.
-        correction: that undoes it, and what was found before it.
-        agreement: of the recording that is corrected so.
-        needed: evidence less its price that is lost without it, all others searched anew [nats].
-    """
-
-    hypothesis: Hypothesis
-    numbers: np.ndarray
-    std: np.ndarray
-    correction: Correction
-    agreement: Agreement
-    needed: float = math.inf
-
-    @property
-    def remedy(self) -> str:
-        """Remedy for the error."""
-        values = dict(zip(self.hypothesis.names, map(float, self.numbers), strict=True))
-        return self.hypothesis.remedy(values)
-
-    @property
-    def is_beyond(self) -> bool:
-        """Whether its numbers are more than how signals are sampled."""
-        return not self.numbers.size or float(np.abs(self.numbers).max()) >= self.hypothesis.least
-
-    @property
-    def worth(self) -> float:
-        """Evidence less the price of the hypothesis [nats]."""
-        return self.agreement.evidence - _price(self.hypothesis)
-
-
-@dataclass(frozen=True, eq=False)
-class Connection:
-    """Errors of the connection, with their rivals.
-
-    Attributes:
-        errors: in the order in which they were found.
-        rivals: of each, best first.
-        start: agreement of the recording as it is.
-        end: agreement once errors, and physics that hides them, are undone.
-        delay_std: what these add to the uncertainty of a delay of the targets [s].
-    """
-
-    errors: tuple[Tried, ...]
-    rivals: tuple[tuple[Tried, ...], ...]
-    start: Agreement
-    end: Agreement
-    delay_std: float = 0.0
-
-    @property
-    def is_enough(self) -> bool:
-        """Whether no error was found, and no residual counts as physics at any joint."""
-        return not self.errors and float(self.end.left.max()) <= COUNTED_SHARE
-
-    def without(self, i: int) -> Connection:
-        """Return the errors but one, with their numbers as they are."""
-        rivals = self.rivals[:i] + self.rivals[i + 1 :]
-        return replace(self, errors=undoing(self.errors[:i] + self.errors[i + 1 :]), rivals=rivals)
-
-
 def search(probe: Probe) -> Connection:
     """Return the errors that explain what bodies and everyday friction do not.
 
@@ -98,16 +33,14 @@ def search(probe: Probe) -> Connection:
     """
     none = Correction.none(probe.motion.tree.size)
     start = probe.agreement(none)
-    rivals: dict[tuple[str, str, tuple[str, ...]], tuple[Tried, ...]] = {}
-    chains: list[list[Tried]] = []
+    chains: list[tuple[list[Tried], Rivals]] = []
     for h in hypotheses(probe.full):
         first = _physics(probe, h) if h.is_physics else None
         if first is not None and _gain(probe, first, none, start) > PER_EFFECT:
-            rivals[h.key] = ()
-            chains.append(_grown(probe, [first], first.agreement, rivals))
-    if all(c[-1].agreement.left.max() > COUNTED_SHARE for c in chains):
-        chains.append(_grown(probe, [], start, rivals))
-    best = max(chains, key=lambda c: _worth(c, start))
+            chains.append(_grown(probe, [first], first.agreement))
+    if all(c[-1].agreement.left.max() > COUNTED_SHARE for c, _ in chains):
+        chains.append(_grown(probe, [], start))
+    best, rivals = max(chains, key=lambda c: _worth(c[0], start))
     # physics beside them stays to be found
     errors = undoing([e for e in best if not e.hypothesis.is_physics])
     late = max((float(e.std[0]) for e in best if e.hypothesis.is_physics), default=0.0)
@@ -128,28 +61,32 @@ def _physics(probe: Probe, h: Hypothesis) -> Tried:
 
 
 def _worth(errors: Sequence[Tried], start: Agreement) -> float:
-    """Return the evidence with all errors undone less their prices [nats]."""
-    price = sum(_price(e.hypothesis) for e in errors)
+    """Return the evidence with all errors undone less their prices, numbers' twice [nats]."""
+    price = sum(price_of_one(e.hypothesis) + PER_PARAMETER * len(e.numbers) for e in errors)
     return (errors[-1].agreement if errors else start).evidence - price
 
 
 def _grown(
-    probe: Probe, errors: list[Tried], now: Agreement,
-    rivals: dict[tuple[str, str, tuple[str, ...]], tuple[Tried, ...]],
-) -> list[Tried]:  # fmt: skip
-    """Return errors with those that are worth their price beside them, one after the other."""
+    probe: Probe, errors: list[Tried], now: Agreement
+) -> tuple[list[Tried], Rivals]:  # fmt: skip
+    """Return errors with those that are worth their price beside them, one after the other.
+
+    With the rivals of those that were added.
+    """
+    rivals: Rivals = {}
     for _ in range(_MOST - len(errors)):
         correction = errors[-1].correction if errors else Correction.none(probe.motion.tree.size)
         is_late = any(e.hypothesis.is_physics for e in errors)
         ranked = _ranked(probe, correction, now, errors, is_beside_delay=is_late)
         if is_late:
             ranked = _beside(probe, errors, ranked)
+        ranked = sorted(ranked, key=_simply_worth, reverse=True)
         if not ranked or _gain(probe, ranked[0], correction, now) <= 0.0:
             break
         rivals[ranked[0].hypothesis.key] = tuple(ranked[1:])
         errors = _together(probe, [*errors, ranked[0]]) if errors else ranked[:1]
         now = errors[-1].agreement
-    return errors
+    return errors, rivals
 
 
 def _gain(probe: Probe, tried: Tried, base: Correction, now: Agreement) -> float:
@@ -163,24 +100,14 @@ def _gain(probe: Probe, tried: Tried, base: Correction, now: Agreement) -> float
     gains = []
     for unknowns in (None, SUDDEN) if is_of_clock else (None,):
         both = [probe.agreement(c, unknowns, nominal).evidence for c in (tried.correction, base)]
-        gains.append(both[0] - both[1] - _price(tried.hypothesis))
+        gains.append(both[0] - both[1] - price_of_one(tried.hypothesis))
     return min(gains)
 
 
-def undoing(errors: Sequence[Tried]) -> tuple[Tried, ...]:
-    """Return errors that are undone one after the other, with their numbers as they are."""
-    kept: list[Tried] = []
-    for e in errors:
-        before = kept[-1].correction if kept else Correction.none(len(e.correction.scale))
-        kept.append(replace(e, correction=e.hypothesis.applied(before, e.numbers)))
-    return tuple(kept)
-
-
 def _beside(probe: Probe, errors: Sequence[Tried], ranked: Sequence[Tried]) -> list[Tried]:
-    """Return further errors with all numbers searched at once, best first."""
+    """Return further errors with all numbers searched at once."""
     chains = [_chain(_joint(probe, [*errors, t]).best()) for t in ranked]
-    found = [c[-1] for c in chains if c[-1].agreement.distance(c[-2].agreement) > COUNTED_SHARE]
-    return sorted(found, key=lambda t: -t.worth)
+    return [c[-1] for c in chains if c[-1].agreement.distance(c[-2].agreement) > COUNTED_SHARE]
 
 
 def _together(probe: Probe, errors: Sequence[Tried]) -> list[Tried]:
@@ -191,7 +118,7 @@ def _together(probe: Probe, errors: Sequence[Tried]) -> list[Tried]:
     found = _joint(probe, errors).best()
     while True:
         fewer = [_without(found, i) for i in range(len(found.hypotheses))]
-        needed = [found.evidence - f.evidence - _price(h)
+        needed = [found.evidence - f.evidence - price_of_one(h)
                   for f, h in zip(fewer, found.hypotheses, strict=True)]  # fmt: skip
         least = int(np.argmin(needed))
         if needed[least] >= 0.0 or len(fewer) == 1:
@@ -200,8 +127,12 @@ def _together(probe: Probe, errors: Sequence[Tried]) -> list[Tried]:
     return [replace(e, needed=x) for e, x in zip(_chain(found), needed, strict=True)]
 
 
-def _price(h: Hypothesis) -> float:
-    return PER_EFFECT + PER_PARAMETER * len(h.names)
+def _simply_worth(tried: Tried) -> float:
+    """Return the worth by which errors are chosen, each number priced twice [nats].
+
+    Nearly as much as one number explains three do, which a small error beside it sets anyhow.
+    """
+    return tried.worth - PER_PARAMETER * len(tried.numbers)
 
 
 def _joint(probe: Probe, errors: Sequence[Tried]) -> Together:
@@ -228,7 +159,7 @@ def _ranked(
     probe: Probe, base: Correction, now: Agreement, errors: Sequence[Tried], *,
     is_beside_delay: bool,
 ) -> list[Tried]:  # fmt: skip
-    """Return the hypotheses that are worth most on top of a correction, best first.
+    """Return the hypotheses that are worth most on top of a correction.
 
     Left out are those that change less than what is slight, and those of sampling. One that is
     too small for physics is still an error, and bodies would stand for it.
@@ -250,9 +181,8 @@ def _ranked(
         drives = [s for s in screened[_REFINED:] if s[1].is_of_gains]
         return [_refined(probe, base, h, x) for _, h, x in screened[:_REFINED] + drives]
     found = [_refined(probe, base, h, x) for _, h, x in screened[:_REFINED]]
-    found = [t for t in found if t.agreement.distance(now) > SLIGHT_REST and t.is_beyond
-             and t.agreement.leaves_less(now)]  # fmt: skip
-    return sorted(found, key=lambda t: -t.worth)
+    return [t for t in found if t.agreement.distance(now) > SLIGHT_REST and t.is_beyond
+            and t.agreement.leaves_less(now)]  # fmt: skip
 
 
 def _parabola(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> np.ndarray:

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sgp_ros.diagnosis.setup.connection import Connection, Tried
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.said import clear, error_finding
-from sgp_ros.diagnosis.setup.search import Connection, Tried
 
 
 @pytest.mark.parametrize(('is_of_gains', 'expected'), [(True, 0.0671), (False, 0.005)])

@@ -132,6 +132,27 @@ def test_a_delay_and_gains_are_searched_together():
     assert all((std > 0.0).all() and (std < 0.02).all() for std in both.std())
 
 
+@pytest.mark.parametrize(('more', 'chosen'), [(5.0, 'one'), (7.0, 'three')])
+def test_of_errors_that_explain_nearly_the_same_the_one_with_fewer_numbers_is_chosen(
+    monkeypatch, more, chosen
+):
+    """Three numbers move an origin as a wrong zero of the joint before it would, and more."""
+    one, three = (
+        SimpleNamespace(worth=worth, numbers=np.zeros(m), correction=None, agreement=None,
+                        hypothesis=SimpleNamespace(key=name, is_physics=False))
+        for name, m, worth in (('one', 1, 20.0), ('three', 3, 20.0 + more))
+    )  # fmt: skip
+    found = [[three, one], []]
+    monkeypatch.setattr(searching, '_ranked', lambda *_, **__: found.pop(0))
+    monkeypatch.setattr(searching, '_gain', lambda *_: 1.0)
+    tree = SimpleNamespace(motion=SimpleNamespace(tree=SimpleNamespace(size=1)))
+    errors, rivals = searching._grown(tree, [], None)
+    assert [e.hypothesis.key for e in errors] == [chosen]
+    assert [[r.hypothesis.key for r in x] for x in rivals.values()] == [
+        [{'one': 'three', 'three': 'one'}[chosen]]
+    ]
+
+
 def test_what_corrects_an_error_makes_the_recording_agree():
     raw, tree = _raw(CASES / 'case_06')
     wrong = Correction.none(tree.size)
