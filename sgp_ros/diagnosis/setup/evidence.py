@@ -43,6 +43,7 @@ from sgp_ros.diagnosis.setup.rows import PER_PERIOD, WIDE, most_hz, spread
 from sgp_ros.diagnosis.setup.unknowns import (
     FRICTION,
     OF_BODIES,
+    OF_MOST,
     OF_ROTORS,
     SETS,
     Agreement,
@@ -124,6 +125,11 @@ class Probe:
         self._moving = ~resting(raw, motion, bandwidth)[pick]
         self._Y: np.ndarray | None = None  # fresh memory costs more than the computation
 
+    @property
+    def most_usual(self) -> int:
+        """Number of the set of unknowns that most robots have."""
+        return OF_MOST[self._rotors is not None]
+
     def acting(self, clock: float) -> Acting:
         """Return the recorded efforts taken `clock` later."""
         if clock not in self._known:
@@ -148,14 +154,13 @@ class Probe:
         return Acting(proportional, damping, other)
 
     def agreement(
-        self, correction: Correction, unknowns: int | None = None,
-        nominal: np.ndarray | None = None,
-    ) -> Agreement:  # fmt: skip
+        self, correction: Correction, *unknowns: int, nominal: np.ndarray | None = None
+    ) -> Agreement:
         """Return how well the recording agrees with the robot once it is corrected.
 
         Args:
             correction: what is undone.
-            unknowns: number of the set of `SETS`; None for the best.
+            unknowns: numbers of sets of `SETS`, of which the best counts; of all without any.
             nominal: see `Agreement`, of all that are compared; None for that of this correction.
         """
         motion = correction.motion(self.motion, self.acting(correction.clock))
@@ -173,7 +178,7 @@ class Probe:
         own = [np.minimum(x.squares / power, 1.0) for x in products]
         tried: list[tuple[float, int, Explained]] = []
         usual = OF_BODIES if self._rotors is None else OF_ROTORS
-        for number in usual if unknowns is None else (unknowns,):
+        for number in unknowns or usual:
             kind = SETS[number]
             i = int(kind.level >= 2)
             floor = self._floor(own[i] if nominal is None else nominal) * power

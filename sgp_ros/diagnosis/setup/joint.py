@@ -48,13 +48,13 @@ class Together:
         probe: the recording.
         hypotheses: what is wrong, in the order in which it is undone.
         numbers: of each, (m_i,) [units of the hypothesis].
-        unknowns: number of the set of unknowns beside them; None for the best.
+        unknowns: numbers of sets of unknowns beside them, see `Probe.agreement`.
     """
 
     probe: Probe
     hypotheses: tuple[Hypothesis, ...]
     numbers: tuple[np.ndarray, ...]
-    unknowns: int | None = None
+    unknowns: tuple[int, ...] = ()
 
     @cached_property
     def correction(self) -> Correction:
@@ -67,7 +67,7 @@ class Together:
     @cached_property
     def agreement(self) -> Agreement:
         """Agreement of the recording that is corrected so."""
-        return self.probe.agreement(self.correction, self.unknowns)
+        return self.probe.agreement(self.correction, *self.unknowns)
 
     @cached_property
     def evidence(self) -> float:
@@ -105,8 +105,8 @@ class Together:
         """
         if not len(self._steps):
             return self
-        near = [replace(self, unknowns=n).near() for n in {0, self.agreement.unknowns}]
-        found = max((replace(f, unknowns=None) for f in near), key=lambda f: f.evidence)
+        near = [replace(self, unknowns=(n,)).near() for n in {0, self.agreement.unknowns}]
+        found = max((replace(f, unknowns=()) for f in near), key=lambda f: f.evidence)
         return found.polished()
 
     def near(self) -> Together:
@@ -168,7 +168,7 @@ class Together:
 
     def std(self) -> tuple[np.ndarray, ...]:
         """Return the standard deviations of all numbers, with all others free."""
-        fixed = replace(self, unknowns=self.agreement.unknowns)
+        fixed = replace(self, unknowns=(self.agreement.unknowns,))
         _, J = fixed._slopes()  # noqa: SLF001 - its own
         values, vectors = np.linalg.eigh(J.T @ J)
         variance = (vectors**2 / np.maximum(values, _FLAT)).sum(axis=1)
@@ -176,12 +176,17 @@ class Together:
         return tuple(np.split(np.abs(self._steps) * np.sqrt(variance), ends))
 
 
-def value_of(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> float:
-    """Return the evidence of a hypothesis with its numbers x on top of a correction [nats]."""
+def value_of(
+    probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray, *unknowns: int
+) -> float:
+    """Return the evidence of a hypothesis with its numbers x on top of a correction [nats].
+
+    Beside sets of unknowns, see `Probe.agreement`.
+    """
     correction = h.applied(base, x)
     if not (h.is_possible(x) and correction.keeps_limits(probe.motion)):
         return -np.inf
-    return probe.agreement(correction).evidence
+    return probe.agreement(correction, *unknowns).evidence
 
 
 def spread(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> np.ndarray:

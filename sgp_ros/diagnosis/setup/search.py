@@ -20,6 +20,8 @@ from sgp_ros.diagnosis.setup.unknowns import SUDDEN, Agreement
 _REFINED = 6
 """Hypotheses of which the numbers are searched to the end."""
 _MOST = 4
+_FINE = 1e-3
+"""Accuracy of the numbers of one hypothesis [its first step]."""
 _FAR = 300.0
 """Evidence that a start may lack and still be looked at [nats]."""
 
@@ -98,8 +100,9 @@ def _gain(probe: Probe, tried: Tried, base: Correction, now: Agreement) -> float
     nominal = np.minimum(tried.agreement.nominal, now.nominal)
     is_of_clock = tried.correction.clock != base.clock
     gains = []
-    for unknowns in (None, SUDDEN) if is_of_clock else (None,):
-        both = [probe.agreement(c, unknowns, nominal).evidence for c in (tried.correction, base)]
+    for unknowns in ((), (SUDDEN,)) if is_of_clock else ((),):
+        both = [probe.agreement(c, *unknowns, nominal=nominal).evidence
+                for c in (tried.correction, base)]  # fmt: skip
         gains.append(both[0] - both[1] - price_of_one(tried.hypothesis))
     return min(gains)
 
@@ -161,62 +164,74 @@ def _ranked(
 ) -> list[Tried]:  # fmt: skip
     """Return the hypotheses that are worth most on top of a correction.
 
-    Left out are those that change less than what is slight, and those of sampling. One that is
-    too small for physics is still an error, and bodies would stand for it.
+    They are looked at beside the unknowns that are best without them and those that most robots
+    have. Left out are those that change less than what is slight, and those of sampling. One that
+    is too small for physics is still an error, and bodies would stand for it.
     """
-    known = [e.hypothesis.key for e in errors]
+    known, beside = [e.hypothesis.key for e in errors], {now.unknowns, probe.most_usual}
     screened = []
     for h in hypotheses(probe.full):
         if h.key in known:
             continue
-        values = [value_of(probe, base, h, x) for x in h.starts]
+        values = [value_of(probe, base, h, x, *beside) for x in h.starts]
         best = int(np.argmax(values))
         value, x = values[best], h.starts[best]
         if len(x) and value > now.evidence - _FAR:
-            x = _parabola(probe, base, h, x)
-            value = max(value, value_of(probe, base, h, x))
+            x = _parabola(probe, base, h, x, *beside)
+            value = max(value, value_of(probe, base, h, x, *beside))
         screened.append((value, h, x))
     screened = sorted((s for s in screened if s[0] > -math.inf), key=lambda s: -s[0])
     if is_beside_delay:  # with other numbers of the delay, gains are others too
         drives = [s for s in screened[_REFINED:] if s[1].is_of_gains]
-        return [_refined(probe, base, h, x) for _, h, x in screened[:_REFINED] + drives]
-    found = [_refined(probe, base, h, x) for _, h, x in screened[:_REFINED]]
+        return [_refined(probe, base, h, x, *beside) for _, h, x in screened[:_REFINED] + drives]
+    found = [_refined(probe, base, h, x, *beside) for _, h, x in screened[:_REFINED]]
     return [t for t in found if t.agreement.distance(now) > SLIGHT_REST and t.is_beyond
             and t.agreement.leaves_less(now)]  # fmt: skip
 
 
-def _parabola(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> np.ndarray:
+def _parabola(
+    probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray, *unknowns: int
+) -> np.ndarray:
     """Return x after one step to the vertex along each number, where that is better."""
     x = x.copy()
     for i, step in enumerate(h.steps_at(x)):
         e = np.zeros(len(x))
         e[i] = step
-        low, mid, high = (value_of(probe, base, h, x + s * e) for s in (-1.0, 0.0, 1.0))
+        low, mid, high = (value_of(probe, base, h, x + s * e, *unknowns) for s in (-1.0, 0.0, 1.0))
         bend = low - 2.0 * mid + high
         move = 0.5 * (low - high) / bend if bend < 0.0 else float(np.sign(high - low))
         trial = x + np.clip(move, -3.0, 3.0) * e
-        if value_of(probe, base, h, trial) > mid:
+        if value_of(probe, base, h, trial, *unknowns) > mid:
             x = trial
     return x
 
 
-def _refined(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> Tried:
-    """Return a hypothesis with its best numbers; 0 for numbers that change nothing."""
-    m = len(x)
-    std = np.zeros(m)
+def _refined(
+    probe: Probe, base: Correction, h: Hypothesis, start: np.ndarray, *unknowns: int
+) -> Tried:
+    """Return a hypothesis with its best numbers; 0 for numbers that change nothing.
+
+    They are searched beside some sets of unknowns, or beside all if another one is best then.
+    """
+    m, steps = len(start), h.steps_at(start)
+    x, std = start, np.zeros(m)
     if m:
-        simplex = np.concatenate([x[None], x + np.diag(h.steps_at(x))])
         found = optimize.minimize(
-            lambda y: -value_of(probe, base, h, y), x, method='Nelder-Mead',
-            options={'initial_simplex': simplex, 'maxfev': 45 * m, 'xatol': 1e-6, 'fatol': 0.02},
+            lambda y: -value_of(probe, base, h, start + steps * y, *unknowns), np.zeros(m),
+            method='Nelder-Mead', options={
+                'initial_simplex': np.eye(m + 1, m, -1), 'maxfev': 45 * m, 'xatol': _FINE,
+                'fatol': 0.02,
+            },
         )  # fmt: skip
-        x = h.canonical(found.x)
+        x = h.canonical(start + steps * found.x)
         std = spread(probe, base, h, x)
         is_known = np.isfinite(std)
         x = np.where(is_known, x, h.neutral)
         x = _of_a_unit(probe, base, h, x) if is_known.all() else x
     correction = h.applied(base, x)
-    return Tried(h, x, std, correction, probe.agreement(correction))
+    tried = Tried(h, x, std, correction, probe.agreement(correction))
+    is_best = not unknowns or tried.agreement.unknowns in unknowns
+    return tried if is_best else _refined(probe, base, h, start)
 
 
 def _of_a_unit(probe: Probe, base: Correction, h: Hypothesis, x: np.ndarray) -> np.ndarray:

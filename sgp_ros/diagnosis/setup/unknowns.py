@@ -52,6 +52,8 @@ SETS = (
 OF_BODIES, OF_ROTORS, SUDDEN = range(len(SETS) - 1), range(3), len(SETS) - 1
 """Numbers of those that are compared with unknown bodies, and with known ones, and of that with
 friction that turns at once, which is tried only if asked for."""
+OF_MOST = SETS.index(Set(2, STATED_ERROR)), SETS.index(Set(2, 1.0))
+"""Numbers of those that most robots have, with unknown bodies and with known ones."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -111,7 +111,7 @@ def test_where_forces_cancel_their_accuracy_counts(slow, tmp_path, monkeypatch):
     cancelled = force.var() / swinging.power[0] - 1.0
     assert cancelled > 0.0
     assert swinging.agreement(none).share[0] >= 0.01 * cancelled
-    assert probe_of(*slow).agreement(none, unknowns=2).share[0] < 0.005
+    assert probe_of(*slow).agreement(none, 2).share[0] < 0.005
 
 
 def test_beside_friction_rows_of_a_held_joint_say_nothing_of_it(slow):
@@ -119,10 +119,10 @@ def test_beside_friction_rows_of_a_held_joint_say_nothing_of_it(slow):
     probe = probe_of(*slow)
     moving = probe._moving
     assert 0.02 < np.mean(~moving[:, 0]) < 0.9
-    found = probe.agreement(Correction.none(1), unknowns=2)
+    found = probe.agreement(Correction.none(1), 2)
     probe._moving = np.ones_like(moving)
     probe._columns.clear()
-    assert found.left[0] < 0.2 * probe.agreement(Correction.none(1), unknowns=2).left[0]
+    assert found.left[0] < 0.2 * probe.agreement(Correction.none(1), 2).left[0]
 
 
 @pytest.mark.long
@@ -150,7 +150,7 @@ def test_noise_does_not_alias_where_rows_are_left_out(tmp_path):
     probe = Probe(raw, tree, replace(choose_bandwidth(raw, tree), cutoff=3.0))
     assert probe.every == 8
     inside = noise**2 * 2.0 * 3.0 * PERIOD
-    left = probe.agreement(Correction.none(2), unknowns=0).left
+    left = probe.agreement(Correction.none(2), 0).left
     assert (left < 1.6 * inside / probe.power).all()
 
 
