@@ -216,12 +216,16 @@ def _rivals(equations: Equations, best: Model, waiting: Sequence[Searched]) -> I
 
 
 def _is_listed(equations: Equations, comparison: Comparison, searched: Searched) -> bool:
-    """Return whether listed laws, with bodies of any kind, say as much as the best formula."""
+    """Return whether listed laws, with bodies of any kind, say as much as the best formula.
+
+    And as much as a force without a formula, where that differs from them by more than a trifle.
+    """
     if not searched.laws:
         return False
     scale = Scale.of(equations, comparison).of_forms()
     listed = (*comparison.singles, *comparison.pairs, *comparison.more)
-    least = scale.worth(searched.laws[0]) - ALIKE
+    found = searched.laws[:1] if searched.is_slight else (searched.laws[0], searched.smooth)
+    least = max(map(scale.worth, found)) - ALIKE
     return any(scale.worth(m) > least and scale.counts(m) for m in listed)
 
 

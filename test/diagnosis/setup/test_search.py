@@ -93,8 +93,8 @@ def test_another_clock_is_worth_it_beside_either_kind_of_friction(clock, gain):
     """Likely only beside friction that builds up, it may be play, or a spring."""
     none = Correction.none(1)
     late = replace(none, clock=clock, scale=np.array([2.0]))
-    evidence = {None: 50.0, SUDDEN: 15.0}
-    probe = SimpleNamespace(agreement=lambda c, unknowns, _nominal: SimpleNamespace(
+    evidence = {(): 50.0, (SUDDEN,): 15.0}
+    probe = SimpleNamespace(agreement=lambda c, *unknowns, nominal: SimpleNamespace(  # noqa: ARG005
         evidence=evidence[unknowns] * (c is late)))  # fmt: skip
     now = SimpleNamespace(nominal=np.ones(1))
     tried = SimpleNamespace(agreement=now, correction=late, hypothesis=SimpleNamespace(names=()))
@@ -223,8 +223,8 @@ def test_what_cannot_be_is_not_searched(monkeypatch):
     impossible = SimpleNamespace(key=(), starts=np.array([[0.1], [10.0]]))
     monkeypatch.setattr(searching, 'hypotheses', lambda _motion: [impossible])
     monkeypatch.setattr(searching, 'value_of', lambda *_: -np.inf)
-    now = SimpleNamespace(evidence=0.0)
-    probe = SimpleNamespace(full=None)
+    now = SimpleNamespace(evidence=0.0, unknowns=0)
+    probe = SimpleNamespace(full=None, most_usual=0)
     assert searching._ranked(probe, None, now, [], is_beside_delay=False) == []
 
 
