@@ -94,7 +94,7 @@ def test_another_clock_is_worth_it_beside_either_kind_of_friction(clock, gain):
     none = Correction.none(1)
     late = replace(none, clock=clock, scale=np.array([2.0]))
     evidence = {(): 50.0, (SUDDEN,): 15.0}
-    probe = SimpleNamespace(agreement=lambda c, *unknowns, nominal: SimpleNamespace(  # noqa: ARG005
+    probe = SimpleNamespace(agreement=lambda c, *unknowns, nominal: SimpleNamespace(
         evidence=evidence[unknowns] * (c is late)))  # fmt: skip
     now = SimpleNamespace(nominal=np.ones(1))
     tried = SimpleNamespace(agreement=now, correction=late, hypothesis=SimpleNamespace(names=()))

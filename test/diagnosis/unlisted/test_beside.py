@@ -13,7 +13,7 @@ from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import compare_models
 from sgp_ros.diagnosis.explain.regression import Columns
-from sgp_ros.diagnosis.unlisted import beside, tried
+from sgp_ros.diagnosis.unlisted import assertion, beside, tried
 from sgp_ros.diagnosis.unlisted import search as searching
 from sgp_ros.diagnosis.unlisted.beside import acts_as_bodies, is_bent, is_creep, is_slight
 from sgp_ros.diagnosis.unlisted.shapes import FINE, SmoothForce
@@ -227,3 +227,21 @@ def test_a_formula_is_looked_for_where_it_may_be_worth_more_than_a_spline(
     columns = SimpleNamespace(equations=lambda _: SimpleNamespace(motion=None))
     scale = SimpleNamespace(worth=lambda m: m.worth)
     assert tried.is_wanted(columns, scale, listed, smooth, 0) is is_asked
+
+
+@pytest.mark.parametrize(
+    ('smooth', 'is_slight', 'is_listed'),
+    [(40.0, False, True), (90.0, False, False), (90.0, True, True)],
+)
+def test_listed_laws_must_say_as_much_as_a_force_without_a_formula(
+    monkeypatch, smooth, is_slight, is_listed
+):
+    """That no formula was found for a force does not make two waves of it; a trifle does."""
+    scale = SimpleNamespace(worth=lambda m: m.worth, counts=lambda _: True)
+    monkeypatch.setattr(assertion.Scale, 'of', lambda *_: SimpleNamespace(of_forms=lambda: scale))
+    listed, formula = SimpleNamespace(worth=50.0), SimpleNamespace(worth=45.0)
+    comparison = SimpleNamespace(singles=(), pairs=(listed,), more=())
+    found = SimpleNamespace(
+        laws=(formula,), smooth=SimpleNamespace(worth=smooth), is_slight=is_slight
+    )
+    assert assertion._is_listed(None, comparison, found) is is_listed
