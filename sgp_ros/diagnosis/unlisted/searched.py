@@ -18,7 +18,6 @@ from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.fitted_model import Model, add_force
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.uncertainty import reported_std
-from sgp_ros.diagnosis.unlisted.beside import own_effects
 from sgp_ros.diagnosis.unlisted.shapes import SmoothForce, smooth_of
 from sgp_ros.physics.catalogue import COULOMB_FRICTION, VISCOUS_FRICTION
 from sgp_ros.physics.effect_at import EffectAt
@@ -66,9 +65,10 @@ class Searched:
         """Return a model without the smooth force, with the everyday laws that stand beside it.
 
         Their numbers are those beside that force. Each is worth its price there and counts as
-        physics. The standard deviations, by the keys of the laws, hold
-        the numbers beside every formula that is worth as much. None where there is no such law,
-        where more is left than may be beside it, or where the force may be friction itself.
+        physics. The standard deviations, by the keys of the laws, hold the numbers beside every
+        formula that is worth as much. None where there is no such law, where more is left than may
+        be beside it, or where the force may be friction itself. Other laws that act on no other
+        joint, such as the mount of a single one, are a part of that force.
 
         Args:
             columns: of the recording.
@@ -97,8 +97,10 @@ class Searched:
             if scale.worth(without) < scale.worth(model) and len(beside) == len(rivals):
                 far = max((abs(x - s.coefficients[0]) for x in beside), default=0.0)
                 found[s.key] = max(*spread, float(far) / INTERVAL)
-        own = {s for s in own_effects(model, self.joint) if s.key not in found} | {placed}
-        return (_stripped(model, own), found) if found else None
+        both = zip(model.effects, model.forces, strict=True)
+        own = {s for s, f in both if not np.delete(f, self.joint, axis=1).any()}
+        left = {s for s in own if s.key not in found} | {placed}
+        return (_stripped(model, left), found) if found else None
 
     def _may_stand(self, s: EffectAt, force: SmoothForce) -> bool:
         """Return whether a law is an everyday one of the joint that the force is no form of."""

@@ -16,6 +16,7 @@ from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.unlisted import assertion, beside, tried
 from sgp_ros.diagnosis.unlisted import search as searching
 from sgp_ros.diagnosis.unlisted.beside import acts_as_bodies, is_bent, is_creep, is_slight
+from sgp_ros.diagnosis.unlisted.searched import Searched
 from sgp_ros.diagnosis.unlisted.shapes import FINE, SmoothForce
 from sgp_ros.diagnosis.unlisted.tried import smooth_forces
 from sgp_ros.diagnosis.unlisted.variables import Variable
@@ -245,3 +246,29 @@ def test_listed_laws_must_say_as_much_as_a_force_without_a_formula(
         laws=(formula,), smooth=SimpleNamespace(worth=smooth), is_slight=is_slight
     )
     assert assertion._is_listed(None, comparison, found) is is_listed
+
+
+@pytest.mark.parametrize('links', [1, 2])
+def test_a_mount_that_acts_on_one_joint_alone_is_a_part_of_its_force(equations_for, links):
+    """Beside it friction stands, however the base of a robot with one joint is tilted."""
+    none = (0.0,) * (links - 1)
+    _, equations = equations_for(simulate(
+        CHAINS[links], 11, 10.0,
+        force=lambda _t, q, v: (-0.6 * q[0] ** 3 - 0.4 * np.tanh(50.0 * v[0]), *none),
+    ))  # fmt: skip
+    columns, motion = Columns(equations), equations.motion
+    smooth = next(e for e in smooth_forces(motion, 0) if e.variable.kind == 'q' and not e.gate)
+    tilt = EFFECTS['gravity_tilt']
+    place = tilt.places(motion)[0]
+    effects = (
+        EffectAt(smooth, Place(0)), EffectAt(EFFECTS['coulomb_friction'], Place(0)),
+        EffectAt(tilt, place, np.array([1e-3, 1e-3])),
+    )  # fmt: skip
+    model = fit(columns, effects, fitted(equations).sigma, still=3)
+    found = Searched(0, model, model, (), np.zeros(0), 0.0)
+    scale = Scale.of(equations, compare_models(equations, lambda _share: None))
+    without, std = found.everyday(columns, scale)
+    assert {s.name for s in without.effects} == {
+        'coulomb_friction', *(['gravity_tilt'] if links > 1 else [])
+    }  # fmt: skip
+    assert [name for name, _ in std] == ['coulomb_friction']
