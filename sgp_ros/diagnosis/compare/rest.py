@@ -16,6 +16,9 @@ _PERIODS = 1.0
 """Time over which the noise of positions is averaged, in periods of their cut-off."""
 _PUSHED = 0.1
 """Acceleration, of the mean square one, below which a slow joint neither stops nor starts."""
+_PASSING = 0.5
+"""Standard deviation of the velocities below a limit, in its parts; 0.58 of a joint that passes
+zero steadily."""
 _NARROW = 1e-2
 """Part of its range within which a joint stays that rests, as dry friction gives way a little."""
 
@@ -35,13 +38,16 @@ def resting(raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwidth) ->
     shortest = max(4, round(0.03 / raw.step))
     rests = np.zeros(motion.velocity.shape, dtype=bool)
     for j in range(motion.velocity.shape[1]):
-        q, speed = motion.position[:, j], np.abs(motion.velocity[:, j])
+        q, velocity = motion.position[:, j], motion.velocity[:, j]
+        speed = np.abs(velocity)
         push = np.abs(motion.acceleration[:, j]) / max(float(pushes[j]), 1e-300)
         least, creep = (x * float(typical[j]) for x in (_SLOW, _CREEP))
         noisy = np.minimum(_NOISES * noise[j], np.maximum(_NOISES * now[:, j], creep))
         surely, perhaps = np.maximum(noisy, least), np.maximum(noisy, creep)
-        slow = _slow(speed, surely, shortest)
-        slow += [x for x in _slow(speed, perhaps, shortest) if np.ptp(q[x]) < _NARROW * np.ptp(q)]
+        slow = _slow(velocity, surely, shortest)
+        slow += [
+            x for x in _slow(velocity, perhaps, shortest) if np.ptp(q[x]) < _NARROW * np.ptp(q)
+        ]
         for part in slow:
             rests[_standing(speed, push, part, least), j] = True
     return rests
@@ -73,9 +79,16 @@ def _standing(speed: np.ndarray, push: np.ndarray, part: slice, least: float) ->
     return slice(part.start + int(there[0]), part.start + int(there[-1]) + 1)
 
 
-def _slow(speed: np.ndarray, limit: np.ndarray, shortest: int) -> list[slice]:
-    """Return the stretches below three times a speed (n,) that have enough rows below it."""
+def _slow(velocity: np.ndarray, limit: np.ndarray, shortest: int) -> list[slice]:
+    """Return the stretches below three times a speed (n,) that have enough rows below it.
+
+    Without those in which a joint passes zero steadily: it has all these speeds equally long,
+    forwards and backwards.
+    """
+    speed = np.abs(velocity)
     wide = np.concatenate([[False], speed <= 3.0 * limit, [False]])
     edges = np.flatnonzero(np.diff(wide.astype(int)))
     parts = (slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True))
-    return [part for part in parts if np.sum((speed <= limit)[part]) >= shortest]
+    parts_of_it = velocity / np.maximum(limit, 1e-300)
+    seen = ((part, parts_of_it[part][speed[part] <= limit[part]]) for part in parts)
+    return [part for part, x in seen if len(x) >= shortest and x.std() < _PASSING]

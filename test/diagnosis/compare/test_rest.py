@@ -6,6 +6,7 @@ import math
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from sgp_ros.diagnosis.compare.rest import resting
 from sgp_ros.diagnosis.compare.trajectory import Bandwidth
@@ -55,6 +56,15 @@ def test_a_reversal_is_no_rest_and_a_still_joint_is():
     found = rests(speed)
     assert found[still].all()
     assert not found[190:210].any()
+
+
+@pytest.mark.parametrize('noise', [1e-9, 1e-7, 4e-7])
+def test_a_joint_that_turns_many_times_and_reverses_does_not_rest_there(noise):
+    """Where it reverses it is in a small part of its range, and slow beside a usual noise."""
+    speed = 8.0 * np.cos(2.0 * np.pi * 0.05 * STEP * np.arange(8000))
+    assert not rests(speed, noise).any()
+    halts = np.concatenate([speed[:3000], np.zeros(60), speed[3000:]])
+    assert rests(halts, noise)[3010:3050].all()
 
 
 def test_a_slow_reversal_is_no_rest_because_stamps_of_fast_motions_jitter():
