@@ -85,9 +85,7 @@ def against_simulation(
             here.columns(equations.motion) @ here.coefficients
             - there.columns(equations.motion) @ there.coefficients
         )
-        joint = here.place.joint
-        share = (force**2).mean(axis=0) / (power if force.ndim == 2 else power[joint])
-        finding = replace(finding, share=float(np.max(share)))
+        finding = replace(finding, share=_share(force, equations, power, here.place.joint))
         is_different = finding.share > COUNTED_SHARE and finding.probability > 0.5
         (findings if is_different else shared).append(_judged(finding, is_different=is_different))
     found = _reference(equations, findings, shared, ours.w - theirs.w)
@@ -125,13 +123,13 @@ def against_model(
         else:
             finding = _compared(here, there, (std, {}), equations)
             force = here.force(motion) - there.force(motion)
-        share = float(((force**2).mean(axis=0) / power).max())
+        share = _share(force, equations, power)
         is_different = share > COUNTED_SHARE and finding.probability > 0.5
         finding = _judged(replace(finding, share=share), is_different=is_different)
         (findings if is_different else shared).append(finding)
     with_all = real.estimates(models[1]) if theirs else {}
     for there in theirs.values():
-        share = float(((there.force(motion) ** 2).mean(axis=0) / power).max())
+        share = _share(there.force(motion), equations, power)
         here, std = with_all[there.key]
         apart = _compared(here, there, (std, {}), equations).probability
         if share > COUNTED_SHARE and apart > 0.5:
@@ -220,6 +218,17 @@ def none_in_simulation(found: Finding) -> Finding:
     none = {q.name: Parameter(q.neutral, None, p.unit) for q, p in ours.items()}
     apart = {q.name: replace(p, value=float(p.value) - q.neutral) for q, p in ours.items()}
     return replace(found, in_simulation=none, difference=apart)
+
+
+def _share(force: np.ndarray, equations: Equations, power: np.ndarray, joint: int = 0) -> float:
+    """Return the largest share of a force while its joint moves; (n, k), or (n,) on one joint.
+
+    At rest friction takes what drives the joint, whatever its law says of no speed.
+    """
+    moving = ~equations.rests
+    if force.ndim == 1:
+        moving, power = moving[:, joint], power[joint]
+    return float(np.max(((force * moving) ** 2).mean(axis=0) / power))
 
 
 def _moving_power(equations: Equations) -> np.ndarray:

@@ -2,11 +2,13 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from sgp_ros.cli import main
+from sgp_ros.diagnosis import reference
 from sgp_ros.diagnosis.decide.differences import decide_several
 from sgp_ros.diagnosis.reference import (
     _compared,
@@ -123,3 +125,15 @@ def test_the_machine_is_compared_with_its_simulation(case, tmp_path, capsys):
         shared = {(f['joint'], f['effect']) for f in found['shared']}
         assert {(j, 'coulomb_friction') for j in ('waist', 'shoulder', 'elbow')} <= shared
         assert 'No mismatch' in printed
+
+
+@pytest.mark.parametrize('joint', [None, 1])
+def test_what_friction_takes_at_rest_is_no_difference(joint):
+    """There it is what drives the joint, whatever a law of Stribeck says of no speed."""
+    rests = np.zeros((10, 2), dtype=bool)
+    rests[4:, 1] = True
+    force = np.zeros((10, 2))
+    force[:, 1] = 3.0
+    equations, power = SimpleNamespace(rests=rests), np.array([1.0, 9.0])
+    found = reference._share(force if joint is None else force[:, 1], equations, power, joint or 0)
+    assert found == pytest.approx(0.4)
