@@ -40,16 +40,18 @@ def resting(raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwidth) ->
     for j in range(motion.velocity.shape[1]):
         q, velocity = motion.position[:, j], motion.velocity[:, j]
         speed = np.abs(velocity)
-        push = np.abs(motion.acceleration[:, j]) / max(float(pushes[j]), 1e-300)
+        push = motion.acceleration[:, j] / max(float(pushes[j]), 1e-300)
         least, creep = (x * float(typical[j]) for x in (_SLOW, _CREEP))
         noisy = np.minimum(_NOISES * noise[j], np.maximum(_NOISES * now[:, j], creep))
         surely, perhaps = np.maximum(noisy, least), np.maximum(noisy, creep)
-        slow = _slow(velocity, surely, shortest)
+        slow = _slow(velocity, push, surely, shortest)
         slow += [
-            x for x in _slow(velocity, perhaps, shortest) if np.ptp(q[x]) < _NARROW * np.ptp(q)
+            x
+            for x in _slow(velocity, push, perhaps, shortest)
+            if np.ptp(q[x]) < _NARROW * np.ptp(q)
         ]
         for part in slow:
-            rests[_standing(speed, push, part, least), j] = True
+            rests[_standing(speed, np.abs(push), part, least), j] = True
     return rests
 
 
@@ -79,16 +81,21 @@ def _standing(speed: np.ndarray, push: np.ndarray, part: slice, least: float) ->
     return slice(part.start + int(there[0]), part.start + int(there[-1]) + 1)
 
 
-def _slow(velocity: np.ndarray, limit: np.ndarray, shortest: int) -> list[slice]:
+def _slow(velocity: np.ndarray, push: np.ndarray, limit: np.ndarray, shortest: int) -> list[slice]:
     """Return the stretches below three times a speed (n,) that have enough rows below it.
 
-    Without those in which a joint passes zero steadily: it has all these speeds equally long,
+    Without those in which a joint is pushed through zero: it has all these speeds equally long,
     forwards and backwards.
     """
     speed = np.abs(velocity)
     wide = np.concatenate([[False], speed <= 3.0 * limit, [False]])
     edges = np.flatnonzero(np.diff(wide.astype(int)))
     parts = (slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True))
-    parts_of_it = velocity / np.maximum(limit, 1e-300)
-    seen = ((part, parts_of_it[part][speed[part] <= limit[part]]) for part in parts)
-    return [part for part, x in seen if len(x) >= shortest and x.std() < _PASSING]
+    share, found = velocity / np.maximum(limit, 1e-300), []
+    for part in parts:
+        core = speed[part] <= limit[part]
+        if core.sum() >= shortest:
+            is_pushed = abs(push[part][core].mean()) >= _PUSHED
+            if not (is_pushed and share[part][core].std() >= _PASSING):
+                found.append(part)
+    return found

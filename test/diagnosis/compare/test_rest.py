@@ -67,6 +67,12 @@ def test_a_joint_that_turns_many_times_and_reverses_does_not_rest_there(noise):
     assert rests(halts, noise)[3010:3050].all()
 
 
+def test_a_joint_that_creeps_through_zero_within_its_friction_rests():
+    """As in a simulator that smooths friction: nothing pushes it through."""
+    speed, creeping = swings(np.linspace(-0.004, 0.004, 100))
+    assert rests(speed)[creeping].mean() > 0.9
+
+
 def test_a_slow_reversal_is_no_rest_because_stamps_of_fast_motions_jitter():
     """Noise of positions is that of their speed: where this is small, so is the noise."""
     speed, still = swings(np.zeros(200))
