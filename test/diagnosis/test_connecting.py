@@ -125,6 +125,24 @@ def test_gains_are_asserted_only_where_bodies_do_not_explain_as_much(
     assert bool(one.equivalents) != asserted
 
 
+def test_what_known_bodies_leave_possible_is_said_beside_open_ones(monkeypatch):
+    """An encoder zero that other bodies explain as well is not forgotten by the next search."""
+    several = SimpleNamespace(decision=SimpleNamespace(verdict='missing_physics'))
+    learned = SimpleNamespace(gains='stated', approach=None)
+    plain = Connected(SimpleNamespace(learned=learned, unstated=()), None, several)
+    zero = SimpleNamespace(errors=('zero',), is_enough=False)
+    for name, stub in {
+        'compared': lambda *_: plain, 'choose_bandwidth': lambda *_: None,
+        'Probe': lambda *_, knows_bodies=False: knows_bodies, 'search': lambda probe: probe,
+        'clear': {True: zero, False: SimpleNamespace(errors=(), is_enough=False)}.get,
+        '_connected': lambda now, found, *_: replace(
+            now, equivalents=(*now.equivalents, *found.errors)),
+    }.items():  # fmt: skip
+        monkeypatch.setattr(connecting, name, stub)
+    one = connecting.connect(plain.recordings, None, lambda _: None)
+    assert one.equivalents == ('zero',)
+
+
 @pytest.mark.parametrize(
     ('of_efforts', 'of_motion', 'is_open', 'gain'),
     [
