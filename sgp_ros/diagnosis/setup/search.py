@@ -63,9 +63,8 @@ def _physics(probe: Probe, h: Hypothesis) -> Tried:
 
 
 def _worth(errors: Sequence[Tried], start: Agreement) -> float:
-    """Return the evidence with all errors undone less their prices, numbers' twice [nats]."""
-    price = sum(price_of_one(e.hypothesis) + PER_PARAMETER * len(e.numbers) for e in errors)
-    return (errors[-1].agreement if errors else start).evidence - price
+    """Return the evidence with all errors undone less their prices [nats]."""
+    return (errors[-1].agreement if errors else start).evidence - sum(map(_price, errors))
 
 
 def _grown(
@@ -82,7 +81,7 @@ def _grown(
         ranked = _ranked(probe, correction, now, errors, is_beside_delay=is_late)
         if is_late:
             ranked = _beside(probe, errors, ranked)
-        ranked = sorted(ranked, key=_simply_worth, reverse=True)
+        ranked = sorted(ranked, key=lambda t: _price(t) - t.agreement.evidence)
         if not ranked or _gain(probe, ranked[0], correction, now) <= 0.0:
             break
         rivals[ranked[0].hypothesis.key] = tuple(ranked[1:])
@@ -130,12 +129,12 @@ def _together(probe: Probe, errors: Sequence[Tried]) -> list[Tried]:
     return [replace(e, needed=x) for e, x in zip(_chain(found), needed, strict=True)]
 
 
-def _simply_worth(tried: Tried) -> float:
-    """Return the worth by which errors are chosen, each number priced twice [nats].
+def _price(tried: Tried) -> float:
+    """Return the price by which errors are chosen, that of their numbers twice [nats].
 
-    Nearly as much as one number explains three do, which a small error beside it sets anyhow.
+    What one number explains three nearly do, which then explain a small error beside it too.
     """
-    return tried.worth - PER_PARAMETER * len(tried.numbers)
+    return price_of_one(tried.hypothesis) + PER_PARAMETER * len(tried.numbers)
 
 
 def _joint(probe: Probe, errors: Sequence[Tried]) -> Together:

@@ -138,9 +138,11 @@ def test_of_errors_that_explain_nearly_the_same_the_one_with_fewer_numbers_is_ch
 ):
     """Three numbers move an origin as a wrong zero of the joint before it would, and more."""
     one, three = (
-        SimpleNamespace(worth=worth, numbers=np.zeros(m), correction=None, agreement=None,
-                        hypothesis=SimpleNamespace(key=name, is_physics=False))
-        for name, m, worth in (('one', 1, 20.0), ('three', 3, 20.0 + more))
+        SimpleNamespace(
+            numbers=np.zeros(m), correction=None, agreement=SimpleNamespace(evidence=evidence),
+            hypothesis=SimpleNamespace(key=name, is_physics=False, names=('x',) * m),
+        )
+        for name, m, evidence in (('one', 1, 20.0), ('three', 3, 26.0 + more))
     )  # fmt: skip
     found = [[three, one], []]
     monkeypatch.setattr(searching, '_ranked', lambda *_, **__: found.pop(0))
