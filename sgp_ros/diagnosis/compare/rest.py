@@ -45,11 +45,8 @@ def resting(raw: RawTrajectory, motion: ObservedMotion, bandwidth: Bandwidth) ->
         noisy = np.minimum(_NOISES * noise[j], np.maximum(_NOISES * now[:, j], creep))
         surely, perhaps = np.maximum(noisy, least), np.maximum(noisy, creep)
         slow = _slow(velocity, push, surely, shortest)
-        slow += [
-            x
-            for x in _slow(velocity, push, perhaps, shortest)
-            if np.ptp(q[x]) < _NARROW * np.ptp(q)
-        ]
+        narrow = _NARROW * np.ptp(q)
+        slow += [x for x in _slow(velocity, push, perhaps, shortest) if np.ptp(q[x]) < narrow]
         for part in slow:
             rests[_standing(speed, np.abs(push), part, least), j] = True
     return rests
@@ -91,11 +88,9 @@ def _slow(velocity: np.ndarray, push: np.ndarray, limit: np.ndarray, shortest: i
     wide = np.concatenate([[False], speed <= 3.0 * limit, [False]])
     edges = np.flatnonzero(np.diff(wide.astype(int)))
     parts = (slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True))
-    share, found = velocity / np.maximum(limit, 1e-300), []
-    for part in parts:
-        core = speed[part] <= limit[part]
-        if core.sum() >= shortest:
-            is_pushed = abs(push[part][core].mean()) >= _PUSHED
-            if not (is_pushed and share[part][core].std() >= _PASSING):
-                found.append(part)
-    return found
+    share = velocity / np.maximum(limit, 1e-300)
+    cores = ((part, np.flatnonzero(speed[part] <= limit[part]) + part.start) for part in parts)
+    return [
+        part for part, at in cores if len(at) >= shortest
+        and (abs(push[at].mean()) < _PUSHED or share[at].std() < _PASSING)
+    ]  # fmt: skip
