@@ -230,7 +230,7 @@ class _Search:
         """Return the model with a law moved into one recording, or from it into another."""
         found = []
         for i, s in enumerate(model.effects):
-            law = s.effect.law if isinstance(s.effect, InRecording) else s.effect
+            law = _law(s)
             if not may_differ(law):
                 continue
             for r in range(self.count):
@@ -264,13 +264,12 @@ class _Search:
         simple = [e for e in EFFECTS.values() if may_differ(e) and len(e.quantities) == 1]
         found = []
         for i, s in enumerate(model.effects):
-            wrap = s.effect.of if isinstance(s.effect, InRecording) else _same
-            law = s.effect.law if isinstance(s.effect, InRecording) else s.effect
+            law = _law(s)
             if not may_differ(law) or len(law.quantities) == 1 or law.is_on_tree:
                 continue
             place = Place(s.place.joint)
             for e in simple:
-                one = EffectAt(wrap(e), place)
+                one = EffectAt(s.effect.of(e) if isinstance(s.effect, InRecording) else e, place)
                 if place in e.places(motion) and one.key not in model.key:
                     effects = (*model.effects[:i], one, *model.effects[i + 1 :])
                     found.append(self.fitted(model, effects))
@@ -294,5 +293,5 @@ class _Search:
         return EVIDENCE < float(support(self.columns, model, *limits)[-1]) < math.inf
 
 
-def _same(law: Effect) -> Effect:
-    return law
+def _law(s: EffectAt) -> Effect:
+    return s.effect.law if isinstance(s.effect, InRecording) else s.effect
