@@ -111,9 +111,9 @@ def diagnose(
         NumericalError: the motion leaves the equations without a solution.
     """
     unstated = open_bodies(robot.name, tree)
-    several = dict(events) if isinstance(events, Mapping) else {'': events}
+    given = dict(events) if isinstance(events, Mapping) else {'': events}
     known = Knowledge(robot, stated, config, gains, is_static=is_static)
-    recordings = gather(several, tests, tree, known, holds_out=holds_out)
+    recordings = gather(given, tests, tree, known, holds_out=holds_out)
     require_signed(recordings.learned, tree.moving_names)
     recordings, tree = prepared(recordings.thinned(), tree, unstated)
     try:
@@ -122,9 +122,10 @@ def diagnose(
         shares = before.nominal, model.left
         said = doubted_scales(connected.findings, model.effects, shares, tree)
         connected = replace(connected, findings=said)
-        found = _diagnosed(connected, robot.name, progress, replays=has_overlays)
+        found, several = _diagnosed(connected, robot.name, progress, replays=has_overlays)
+        connected = replace(connected, several=several)
         if simulated is not None:
-            reference = against_model(connected.equations, connected.several, simulated)
+            reference = against_model(connected.equations, several, simulated)
             return _compared(found, connected, reference, ())
         if simulation is None:
             return found
@@ -140,7 +141,8 @@ def diagnose(
 
 def _diagnosed(
     connected: Connected, robot: str, progress: Progress, *, replays: bool
-) -> Diagnosis:
+) -> tuple[Diagnosis, Several]:
+    """Return the diagnosis of the recordings, and the models that it asserts."""
     recordings, whole = connected.recordings, connected.equations
     raw, tree, names = recordings.learned, whole.motion.tree, recordings.names
     parts = {'train': raw, **recordings.kept, **recordings.held}
@@ -161,7 +163,7 @@ def _diagnosed(
     traded = traded_remarks(whole, model, wrong, recordings.unstated)
     remarks = (*bound_remarks(decision), *left, *chain(*doubts.values()), *hidden, *traded)
     is_doubted = bool(hidden) or rests_on(doubts, findings, tree.moving_names)
-    return Diagnosis(
+    said = Diagnosis(
         robot=robot,
         joints=tree.moving_names,
         units=tuple('N' if p else 'N m' for p in tree.is_prismatic[: tree.size]),
@@ -189,6 +191,7 @@ def _diagnosed(
         overlays=overlays(final, parts if replays else {}, tree),
         law_searches=connected.laws,
     )
+    return said, several
 
 
 _Proven = tuple[Several, Contrasts, Probabilities, FinalModel, tuple[Remainder, ...],
@@ -225,7 +228,7 @@ def _against(
         findings = tuple(none_in_simulation(f) for f in found.findings)
         return replace(found, reference='simulation', findings=findings)
     reference = against_simulation(
-        connected.equations, connected.several, sim.equations, sim.several,
+        connected.equations, connected.several, sim.equations, settled_of(sim.several)[0],
         connected.recordings.unstated,
     )  # fmt: skip
     return _compared(found, connected, reference, (said,))

@@ -1,6 +1,7 @@
 """With a simulation as the reference, what differs from it is found, in either direction."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -8,7 +9,8 @@ import numpy as np
 import pytest
 
 from sgp_ros.cli import main
-from sgp_ros.diagnosis import reference
+from sgp_ros.diagnosis import pipeline, reference
+from sgp_ros.diagnosis.decide.certainty import settled_of
 from sgp_ros.diagnosis.decide.differences import decide_several
 from sgp_ros.diagnosis.reference import (
     _compared,
@@ -21,6 +23,7 @@ from sgp_ros.diagnosis.result import Finding, Location, Parameter
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.place import Place
+from test.diagnosis.worlds import events_of
 
 CASES = Path(__file__).parents[3] / 'shared' / 'practice2' / 'cases'
 ANSWERS = CASES.parent / 'answers'
@@ -51,6 +54,27 @@ def test_bodies_are_compared_with_those_of_the_simulation(equations_for, heavy, 
     assert found.verdict == ('no_mismatch' if is_same else 'parameters_only')
     assert bool(found.bodies) is not is_same
     assert found.findings == ()
+
+
+@pytest.mark.parametrize('refuses', [False, True])
+def test_laws_that_are_refused_do_not_differ_from_a_simulation(
+    robots, dry, viscous, monkeypatch, refuses
+):
+    """Of what was found first, only what is asserted in the end is compared."""
+
+    def refused(several):
+        several, *rest = settled_of(several)
+        plain = several.comparison.base
+        decision = replace(several.decision, model=plain, verdict='parameters_only')
+        return replace(several, decision=decision, model=plain), *rest
+
+    if refuses:
+        monkeypatch.setattr(pipeline, 'settled_of', refused)
+    robot, tree = robots[1]
+    found = pipeline.diagnose(events_of(dry), robot, tree, {}, simulation=events_of(viscous))
+    assert found.reference == 'simulation'
+    names = {f.effect for f in (*found.findings, *found.shared)}
+    assert names == (set() if refuses else {'coulomb_friction', 'viscous_friction'})
 
 
 @pytest.mark.parametrize(
