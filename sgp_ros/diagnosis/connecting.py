@@ -123,7 +123,7 @@ def _connected(
         each: progress of one comparison after the other.
         corrected: what was compared with these errors undone, where that is known.
     """
-    found = found if corrected is not None else _promising(plain, found, tree)
+    found, foreseeable = (found, -math.inf) if corrected else _promising(plain, found, tree)
     if not found.errors:
         return plain
     corrected = corrected or _undone(plain, found, tree, each)
@@ -143,6 +143,7 @@ def _connected(
             gain = _gain(on_band, corrected, price)
     is_one_law = _stands_for_gains(plain, found)
     if gain < (-ALIKE if is_one_law else PER_EFFECT):
+        gain = max(gain, min(foreseeable, 0.0))  # a search on corrected recordings found less
         is_alike = gain + rare >= -ALIKE
         return _beside(plain, found.errors, gain, _named(corrected)) if is_alike else plain
     if is_one_law:  # under another name it is there anyway
@@ -174,19 +175,20 @@ def _undone(
     return replace(compared(recordings, whole, next(each)), correction=correction)
 
 
-def _promising(plain: Connected, found: Connection, tree: Tree) -> Connection:
-    """Return errors, with better numbers, that are worth something with the laws found without.
+def _promising(plain: Connected, found: Connection, tree: Tree) -> tuple[Connection, float]:
+    """Return errors, with better numbers, and their gain with the laws found without [nats].
 
     Where these explain the recordings as they are, a comparison of all models on corrected ones
     finds hardly more than with such laws, or fewer, and takes as long as everything before. None
     are left that are worth much too little so.
     """
     if not found.errors or plain.verdict == 'unexplained':
-        return found
+        return found, -math.inf
     corrected, (price, rare) = foreseen(plain, found.errors[-1].correction, tree), price_of(found)
-    if _gain(plain, corrected, price) + rare < -2.0 * ALIKE:
-        return replace(found, errors=(), rivals=())
-    return refined(found, plain, corrected, tree)[0]
+    gain = _gain(plain, corrected, price)
+    if gain + rare < -2.0 * ALIKE:
+        return replace(found, errors=(), rivals=()), gain
+    return refined(found, plain, corrected, tree)[0], gain
 
 
 def _refined(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -11,7 +12,7 @@ import pytest
 from sgp_ros.diagnosis import connecting
 from sgp_ros.diagnosis.connected import Connected
 from sgp_ros.diagnosis.connecting import in_halves
-from sgp_ros.diagnosis.criteria import ALIKE
+from sgp_ros.diagnosis.criteria import ALIKE, TEMPER
 from sgp_ros.diagnosis.setup.connection import Connection, Tried
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.physics.catalogue import TORQUE_GAIN
@@ -38,7 +39,7 @@ def _found(monkeypatch, compare, numbers):
         'setup_advice': lambda _: 'advice', 'refined': lambda found, *_: (found, False),
     }.items():  # fmt: skip
         monkeypatch.setattr(connecting, name, stub)
-    hypothesis = SimpleNamespace(effect='', names=numbers, is_of_gains=False)
+    hypothesis = SimpleNamespace(effect='', joint='', names=numbers, is_of_gains=False)
     correction = SimpleNamespace(tree=lambda tree: tree)
     error = SimpleNamespace(
         correction=correction, numbers=numbers, remedy='', hypothesis=hypothesis
@@ -91,6 +92,25 @@ def test_errors_without_hope_are_not_compared(monkeypatch, verdict, gain, is_com
     said = connecting._connected(plain, found, None, in_halves(lambda _: None))
     assert said is plain
     assert bool(compared) is is_compared
+
+
+@pytest.mark.parametrize(('foresaw', 'is_said'), [(-1.0, True), (-1.0 - ALIKE, False)])
+def test_an_error_is_said_that_fits_as_well_with_the_laws_found_without(
+    monkeypatch, foresaw, is_said
+):
+    """Whatever the search finds where it is undone; it is never asserted for that."""
+    found = _found(monkeypatch, lambda *_: _of(10.0), ())
+    gains = iter([foresaw, -2.0 * ALIKE])
+    for name, stub in {
+        '_gain': lambda *_: next(gains), 'price_of': lambda _: (10.0, 0.0),
+        '_named': lambda _: frozenset(),
+    }.items():  # fmt: skip
+        monkeypatch.setattr(connecting, name, stub)
+    said = connecting._connected(_of(10.0), found, None, in_halves(lambda _: None))
+    assert not said.findings
+    assert bool(said.equivalents) is is_said
+    if is_said:
+        assert said.trust == pytest.approx(1.0 / (1.0 + math.exp(TEMPER * foresaw)))
 
 
 @pytest.mark.parametrize(
@@ -203,7 +223,7 @@ def test_an_error_that_is_not_certain_must_be_worth_it_beside_physics(
     monkeypatch.setattr(Correction, 'tree', lambda _self, tree: tree)
     for name, stub in {
         'compared': lambda *_: _of(10.0), '_gain': gain, '_named': lambda _: frozenset(),
-        '_promising': lambda _plain, found, _tree: found,
+        '_promising': lambda _plain, found, _tree: (found, -math.inf),
         'refined': lambda found, *_: (found, False),
         'price_of': lambda found: (10.0, 10.0 * (len(found.errors) - 1)),
         'equal_errors': lambda _: (), '_stands_for_gains': lambda *_: False,
