@@ -56,11 +56,11 @@ def asserted(
         own = decision.standing.get(model.effects[i].key, 0.0)
         std[i].update(dict.fromkeys(std[i], own) if own else {})
     left, findings = physics_left(equations, model, decision.unknown), []
-    for i in common:
-        s = model.effects[i]
+    for i, force in zip(common, forces, strict=True):
+        s, moved = model.effects[i], (force**2).mean(axis=0) > COUNTED_SHARE * equations.power
         found = doubted_if_none(_finding(decision, model, i, std[i], chances), s)
         found = doubted_if_late(found, s, equations.motion)
-        findings.append(doubted_beside(found, s, left))
+        findings.append(doubted_beside(found, s, left[moved]))
     findings += [
         _unknown(equations, decision, j, remainders, chances, depends) for j in decision.unknown
     ]
@@ -149,12 +149,13 @@ def doubted_if_late(finding: Finding, effect: EffectAt, motion: ObservedMotion) 
 
 
 def doubted_beside(finding: Finding, effect: EffectAt, left: np.ndarray) -> Finding:
-    """Return a finding, doubted if physics is left (k,) at the joint of a rare law.
+    """Return a finding, doubted if physics is `left` at each joint where a rare law counts.
 
-    Another law would explain that, and may hide in this one, whose form was not chosen.
+    Another law would explain that, and may hide in this one, whose form was not chosen. What says
+    the same at a joint where nothing is left is no disguise.
     """
-    law, joint = effect.effect, effect.place.joint
-    if law.is_usual or law.has_chosen_form or joint < 0 or not left[joint]:
+    law, at_joint = effect.effect, effect.place.joint >= 0
+    if law.is_usual or law.has_chosen_form or not (at_joint and left.size and left.all()):
         return finding
     why = 'what is left at its joint comes back with the motion, and counts as physics'
     return replace(finding, probability=min(finding.probability, DOUBTED), why=why)
