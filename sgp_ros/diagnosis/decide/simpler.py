@@ -21,8 +21,8 @@ from sgp_ros.physics.place import Place
 def simpler(equations: Equations, decision: Decision, scale: Scale) -> Model | None:
     """Return a model without a law that few joints have and that is hardly worth more.
 
-    With its plain law in its place, where there is one, or a usual one that looks alike, or a law
-    of fewer numbers that a rival has there.
+    With its plain law in its place, where there is one, on either joint or both if it has two; or
+    a usual one that looks alike, or a law of fewer numbers that a rival has there.
     """
     model = decision.model
     least = scale.worth(model) - ALIKE
@@ -31,14 +31,23 @@ def simpler(equations: Equations, decision: Decision, scale: Scale) -> Model | N
         if s.effect.is_usual or s.is_further_wave:
             continue
         laws = [
-            *(EffectAt(EFFECTS[name], Place(s.place.joint)) for name in s.effect.alike),
-            *_of_fewer_numbers(s, near),
+            *((EffectAt(EFFECTS[name], Place(s.place.joint)),) for name in s.effect.alike),
+            *_on_its_joints(s),
+            *((law,) for law in _of_fewer_numbers(s, near)),
         ]
         trials = (without_one(equations, model, s), *_exchanged(equations, model, s, laws))
-        for trial in trials:
-            if trial.effects and is_credible(trial) and scale.worth(trial) > least:
-                return trial
+        known = [m for m in trials if m.effects and is_credible(m) and scale.worth(m) > least]
+        if known:
+            return max(known, key=scale.worth)
     return None
+
+
+def _on_its_joints(effect: EffectAt) -> Iterator[tuple[EffectAt, ...]]:
+    """Yield a plain law of one that acts between two joints, on each of them and on both."""
+    joints = (effect.place.joint, effect.place.source)
+    for name in effect.effect.plain if joints[1] >= 0 else ():
+        each = tuple(EffectAt(EFFECTS[name], Place(j)) for j in joints)
+        yield from (each[:1], each[1:], each)
 
 
 def _of_fewer_numbers(effect: EffectAt, rivals: list[Model]) -> list[EffectAt]:
@@ -50,13 +59,14 @@ def _of_fewer_numbers(effect: EffectAt, rivals: list[Model]) -> list[EffectAt]:
 
 
 def _exchanged(
-    equations: Equations, model: Model, effect: EffectAt, laws: list[EffectAt]
+    equations: Equations, model: Model, effect: EffectAt, laws: list[tuple[EffectAt, ...]]
 ) -> Iterator[Model]:
-    """Yield models with another law in the place of an effect."""
+    """Yield models with other laws, one or more, in the place of an effect."""
     others = tuple(s for s in model.effects if s is not effect)
-    for law in laws:
-        if law.key not in model.key:
-            yield fit(Columns(equations), (*others, law), model.sigma, is_free=model.is_free,
+    for some in laws:
+        new = tuple(law for law in some if law.key not in model.key)
+        if new:
+            yield fit(Columns(equations), (*others, *new), model.sigma, is_free=model.is_free,
                       w=model.w, still=len(others))  # fmt: skip
 
 

@@ -182,6 +182,19 @@ def test_a_law_that_says_the_same_at_another_joint_is_not_doubted(equations_for,
     assert ('counts as physics' in said.why) is (len(rippled) == 2)
 
 
+def test_two_joints_that_rub_are_no_motor_that_turns_with_both(equations_for):
+    """With a large ratio that motor rubs on the source, and a little on its own joint."""
+    world = simulate(CHAINS[2], 4, 10.0, force=lambda _t, _q, v: (-3.0 * v[0], -0.3 * v[1]))
+    _, equations = equations_for(world)
+    motor = EffectAt(EFFECTS['coupled_friction'], Place(1, source=0), np.array([10.0]))
+    start = np.sqrt((equations.d**2).mean(axis=0))
+    model = fit(Columns(equations), (motor,), start, is_free=False)
+    scale = Scale.of(equations, _comparison(equations, model))
+    plainer = simpler(equations, SimpleNamespace(model=model, rivals=()), scale)
+    assert plainer.key == {('viscous_friction', Place(j)) for j in (0, 1)}
+    assert scale.worth(plainer) > scale.worth(model)
+
+
 def test_a_rotor_takes_the_place_of_a_gain_that_is_worth_as_much(equations_for):
     """A motor of half the torque is a motor of twice the inertia, where no gravity tells them."""
     chain = (replace(CHAINS[1][0], inertia=CHAINS[1][0].inertia + 0.05),)
