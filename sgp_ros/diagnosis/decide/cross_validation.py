@@ -1,4 +1,4 @@
-"""Held-out evidence of effects, and the cross-validated R^2 of what a model leaves.
+"""Cross-validated R^2 of what a model leaves, and models whose effects all have support.
 
 What the motion of the robot predicts of a residual on stretches left out, or what the residual
 predicts of itself, is structure that an adequate model would have. What neither predicts is noise,
@@ -9,11 +9,6 @@ at the time of it does. Neither sees the efforts: where friction takes all of an
 effort would explain itself. The second tests whether the residual is white: linear prediction from
 rows before; white noise behind the filter is predicted too, by as much as its correlations say
 (Makhoul 1975), and that is taken off.
-
-The held-out evidence of an effect is how much better the model with it predicts parts left out of
-the fit than the model without it. Shapes stay as they were found; coefficients and bodies are
-fitted anew without each part. An effect whose numbers only follow chance, or one stretch, predicts
-the others worse.
 """
 
 from __future__ import annotations
@@ -25,6 +20,7 @@ import numpy as np
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import EVIDENCE, LEAST_SHARE, STRUCTURE_LEAST_SHARE
 from sgp_ros.diagnosis.decide.scale import Scale, beyond_noise
+from sgp_ros.diagnosis.decide.support import support
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model
@@ -161,76 +157,6 @@ def _by_motion(equations: Equations, r: np.ndarray, joint: int) -> float:
     prior, data = CoefficientPrior.flat(0), observations(U, r, rows)
     start = screened(data, prior, initial_model(data, (tuple(range(U.shape[1])),)))
     return explained_share(learn(data, prior, start).model, U, r, part)
-
-
-def left_out(
-    columns: Columns, model: Model, candidates: tuple[EffectAt, ...]
-) -> tuple[np.ndarray, float]:
-    """Return what a model with some of its candidates leaves of parts left out in turn.
-
-    Args:
-        columns: of the recording.
-        model: whose shapes, freedom of the bodies and scale are used.
-        candidates: of the model, those that are kept.
-
-    Returns:
-        Mean squares of the residual, (PARTS, k) [N^2 m^2 or N^2], and how unlikely the bodies are
-        that follow: minus the log prior of their changes, averaged over the parts [nats].
-    """
-    equations, sigma = model.frame.equations, model.sigma
-    N, k = equations.d.shape
-    p = len(model.frame.R)
-    y, X = equations.d / sigma, [equations.base[:, :, :p] / sigma[:, None]]
-    for candidate in candidates:
-        x = columns.of(candidate, equations, model.w) / sigma[:, None]
-        if candidate.effect.is_given:
-            y = y - x[:, :, 0]
-        else:
-            X.append(x)
-    A = np.concatenate(X, axis=2)
-    scale = np.sqrt((A**2).sum(axis=(0, 1))) + 1e-300
-    scale[:p] = 1.0
-    A = A / scale
-    part = parts_of(N)
-    grams = [np.tensordot(A[part == i], A[part == i], ((0, 1), (0, 1))) for i in range(PARTS)]
-    sides = [np.tensordot(A[part == i], y[part == i], ((0, 1), (0, 1))) for i in range(PARTS)]
-    prior = model.frame.weight * np.diag(np.repeat([1.0, 0.0], [p, A.shape[2] - p]))
-    pull = np.zeros(len(prior))
-    pull[:p] = model.frame.pull
-    found, unlikely = np.empty((PARTS, k)), 0.0
-    for i in range(PARTS):
-        G = sum(grams[:i] + grams[i + 1 :], prior)
-        c = np.linalg.lstsq(G, sum(sides[:i] + sides[i + 1 :], pull), rcond=1e-12)[0]
-        r = (y[part == i] - A[part == i] @ c) * sigma
-        found[i] = (r**2).mean(axis=0)
-        unlikely += 0.5 * float(c[:p] @ c[:p]) / PARTS
-    return found, unlikely
-
-
-def support(columns: Columns, model: Model, floor: np.ndarray, rows: float) -> np.ndarray:
-    """Return how much better parts left out are predicted with each effect than without it.
-
-    Bodies that could imitate an effect, such as the inertia of a rotor, predict as much: then it
-    counts how unlikely they are.
-
-    Args:
-        columns: of the recording.
-        model: fitted.
-        floor: (k,) mean squares below which residuals do not count [N^2 m^2 or N^2].
-        rows: that count as independent.
-
-    Returns:
-        By effect: half the sum over joints of the log ratio of mean squares, averaged over the
-        parts, times the rows, and by how much likelier the bodies are [nats].
-    """
-    whole, unlikely = left_out(columns, model, model.effects)
-    found = []
-    for candidate in model.effects:
-        rest = tuple(s for s in model.effects if s is not candidate)
-        without, strained = left_out(columns, model, rest)
-        better = 0.5 * np.log((without + floor) / (whole + floor)).sum(axis=1).mean()
-        found.append(rows * float(better) + strained - unlikely)
-    return np.array(found)
 
 
 def without(equations: Equations, model: Model, is_dropped: Callable[[EffectAt], bool]) -> Model:

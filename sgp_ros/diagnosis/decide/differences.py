@@ -22,11 +22,11 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, DOUBTED, EVIDENCE, MOST_CERTAIN, TEMPER
-from sgp_ros.diagnosis.decide.cross_validation import support
 from sgp_ros.diagnosis.decide.decision import Decision, decide, refused
 from sgp_ros.diagnosis.decide.each_alone import models_of_each, put_together
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
 from sgp_ros.diagnosis.decide.scale import Scale, moving_power
+from sgp_ros.diagnosis.decide.support import support
 from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.comparison import Comparison, compare_models
 from sgp_ros.diagnosis.explain.fitted_model import Model

@@ -8,9 +8,10 @@ import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import EVIDENCE, PER_PARAMETER
-from sgp_ros.diagnosis.decide.cross_validation import physics_left, support
+from sgp_ros.diagnosis.decide.cross_validation import physics_left
 from sgp_ros.diagnosis.decide.decision import Decision
 from sgp_ros.diagnosis.decide.scale import Scale
+from sgp_ros.diagnosis.decide.support import support
 from sgp_ros.diagnosis.explain.credibility import is_sound
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns

@@ -11,14 +11,13 @@ from sgp_ros.diagnosis.criteria import EVIDENCE, INDEPENDENT_ROWS
 from sgp_ros.diagnosis.decide import cross_validation
 from sgp_ros.diagnosis.decide.cross_validation import (
     LEAST_ROWS,
-    left_out,
     repeatable,
     structure,
-    support,
     supported,
 )
 from sgp_ros.diagnosis.decide.decision import decide
 from sgp_ros.diagnosis.decide.scale import Scale
+from sgp_ros.diagnosis.decide.support import left_out, support
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.locate.remainder import PARTS, PIECES, parts_of
@@ -130,7 +129,7 @@ def test_parts_are_predicted_by_a_fit_to_the_others(damped, is_free):
     """As least squares on the rows that remain, written out."""
     model = fitted(damped, 'viscous_friction', 'spring', is_free=is_free)
     columns = Columns(damped)
-    found, unlikely = left_out(columns, model, model.effects)
+    (found,), (unlikely,) = left_out(columns, model, (None,))
     x = [columns.of(s, damped, model.w)[:, 0] for s in model.effects]
     p = damped.base.shape[2] if is_free else 0
     A = np.concatenate([damped.base[:, 0, :p], *x], axis=1) / model.sigma[0]

@@ -18,7 +18,7 @@ from sgp_ros.diagnosis.criteria import (
     PER_UNUSUAL,
     SLIGHT_REST,
 )
-from sgp_ros.diagnosis.decide.cross_validation import support
+from sgp_ros.diagnosis.decide.support import support
 from sgp_ros.diagnosis.explain import growth, joint_search
 from sgp_ros.diagnosis.explain.candidates import fit, split
 from sgp_ros.diagnosis.explain.credibility import gain, is_credible
