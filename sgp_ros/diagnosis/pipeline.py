@@ -122,7 +122,8 @@ def diagnose(
         shares = before.nominal, model.left
         said = doubted_scales(connected.findings, model.effects, shares, tree)
         connected = replace(connected, findings=said)
-        found, several = _diagnosed(connected, robot.name, progress, replays=has_overlays)
+        found, several = _diagnosed(connected, robot.name, replays=has_overlays)
+        progress(1.0)
         connected = replace(connected, several=several)
         if simulated is not None:
             reference = against_model(connected.equations, several, simulated)
@@ -139,9 +140,7 @@ def diagnose(
         ) from error
 
 
-def _diagnosed(
-    connected: Connected, robot: str, progress: Progress, *, replays: bool
-) -> tuple[Diagnosis, Several]:
+def _diagnosed(connected: Connected, robot: str, *, replays: bool) -> tuple[Diagnosis, Several]:
     """Return the diagnosis of the recordings, and the models that it asserts."""
     recordings, whole = connected.recordings, connected.equations
     raw, tree, names = recordings.learned, whole.motion.tree, recordings.names
@@ -154,7 +153,6 @@ def _diagnosed(
     wrong = parameter_errors(whole, model, recordings.unstated)
     findings, forces = asserted(whole, on_all, lags, learned, chances, depends)
     findings, differ = tuple(map(connected.against_rivals, findings)), differences(several, names)
-    progress(1.0)
     certainty = certainty_of((*findings, *differ), comparison, connected.trust, decision.verdict)
     vain = reasons_to_doubt({'train': proofs['train']}, recordings.still)
     findings = doubted(findings, vain, tree.moving_names)

@@ -98,7 +98,7 @@ def test_errors_without_hope_are_not_compared(monkeypatch, verdict, gain, is_com
 def test_an_error_is_said_that_fits_as_well_with_the_laws_found_without(
     monkeypatch, foresaw, is_said
 ):
-    """Whatever the search finds where it is undone; it is never asserted for that."""
+    """The search finds less where it is undone; it is said, and never asserted for that."""
     found = _found(monkeypatch, lambda *_: _of(10.0), ())
     gains = iter([foresaw, -2.0 * ALIKE])
     for name, stub in {
