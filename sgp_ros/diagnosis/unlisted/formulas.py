@@ -60,6 +60,7 @@ NEAREST = {
     'a*((X - u0)/r)**(-p0)': 'a gas spring or a magnet',
     'a*exp(-((X - x0)/w0)**2) sign': 'friction near one position',
     'a*X speed': 'damping that depends on the position',
+    'a*sin(n0*(X - x0))**2 speed': 'a damper on a crank',
     'a*sin(n0*X) + b*cos(n0*X)': 'a slow sine wave, such as a weight on an arm or a magnet',
     'a*sin(n0*(X - x0)) + b*sin(n0*(X - x0))/sqrt(1 + e0*cos(n0*(X - x0)))':
         'a spring between two points of a linkage',
@@ -173,8 +174,6 @@ def formulas(
 
 _Tried = tuple[float, str, Followed]
 """Worth of a text [nats, less is better], the text, and how it follows the curve."""
-
-
 ROWS = 100.0
 """Rows that count as independent, as everywhere where models are compared."""
 

@@ -40,7 +40,7 @@ PLACED = (
 """Terms of any variable, with a place of their own."""
 OF_WAVE = (
     'S', 'a*sin(n0*X) + b*cos(n0*X)', 'a*S + b*sin(2*n0*(X - x0))', 'max(S, 0)', 'abs(S)',
-    'abs(S)*S', 'S**3', 'max(S - e0, 0)', 'tanh(p0*S)', 'min(max(p0*S, -1), 1)',
+    'S**2', 'abs(S)*S', 'S**3', 'max(S - e0, 0)', 'tanh(p0*S)', 'min(max(p0*S, -1), 1)',
     'S*exp(p0*C)', 'S/(1 + e0*C)', 'S/sqrt(1 + e0*C)', 'S*(1 + e0*C)**(-p0)',
     'a*S + b*S/sqrt(1 + e0*C)', '1/(1 + e0*C)', '(1 + e0*C)**(-p0)',
     'sin(n0*(X - x0)*(1 + e0*X/r))', 'sin(n0*min(max(X - x0, -3.14159/n0), 3.14159/n0))',

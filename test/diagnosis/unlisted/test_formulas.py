@@ -209,6 +209,7 @@ def test_a_gate_of_a_fiftieth_of_the_range_has_a_width():
         ('a*tanh((abs(X) - v0)/w0)', {'v0': 0.4, 'w0': 0.1}),
         ('a*max(1 - (X/v0)**2, 0)*sign(X)', {'v0': 0.6}),
         ('a*min(max(w0 - abs(X - x0), 0)/w2, 1)', {'x0': 0.1, 'w0': 0.5, 'w2': 0.15}),
+        ('a*sin(n0*(X - x0))**2', {'n0': 1.1, 'x0': -0.6}),
         (
             'a*(((o0 - X)/r)**(-p0) - ((X - u0)/r)**(-p0))',
             {'o0': 1.3, 'u0': -1.4, 'p0': 2.0, 'r': 1.0},
@@ -218,7 +219,8 @@ def test_a_gate_of_a_fiftieth_of_the_range_has_a_width():
 def test_a_text_follows_its_own_curve(text, numbers):
     """Half waves, poles of magnets, fields of coils, thresholds and saturated squares of speed.
 
-    And friction of a part of the speeds, a force within an interval, one that grows at both ends.
+    And friction of a part of the speeds, a force within an interval, one that grows at both
+    ends, a damper on a crank.
     """
     seen, nodes = Range(-1.0, 1.0, 'rad'), np.linspace(-1.0, 1.0, 101)
     is_speed = 'v0' in numbers
