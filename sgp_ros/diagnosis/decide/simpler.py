@@ -36,18 +36,18 @@ def simpler(equations: Equations, decision: Decision, scale: Scale) -> Model | N
             *((law,) for law in _of_fewer_numbers(s, near)),
         ]
         trials = (without_one(equations, model, s), *_exchanged(equations, model, s, laws))
-        known = [m for m in trials if m.effects and is_credible(m) and scale.worth(m) > least]
-        if known:
-            return max(known, key=scale.worth)
+        for trial in trials:
+            if trial.effects and is_credible(trial) and scale.worth(trial) > least:
+                return trial
     return None
 
 
 def _on_its_joints(effect: EffectAt) -> Iterator[tuple[EffectAt, ...]]:
-    """Yield a plain law of one that acts between two joints, on each of them and on both."""
+    """Yield a plain law of one that acts between two joints, on both of them and on each."""
     joints = (effect.place.joint, effect.place.source)
     for name in effect.effect.plain if joints[1] >= 0 else ():
         each = tuple(EffectAt(EFFECTS[name], Place(j)) for j in joints)
-        yield from (each[:1], each[1:], each)
+        yield from (each, each[:1], each[1:])
 
 
 def _of_fewer_numbers(effect: EffectAt, rivals: list[Model]) -> list[EffectAt]:
