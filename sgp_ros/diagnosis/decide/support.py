@@ -8,6 +8,7 @@ part. An effect whose numbers only follow chance, or one stretch, predicts the o
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -39,21 +40,21 @@ def left_out(
     order = np.argsort(part, kind='stable')
     A, owner = _columns_of(columns, model, order)
     y = (frame.equations.d[order] / sigma).reshape(-1)
-    ends = k * np.cumsum(np.bincount(part, minlength=PARTS))
-    rows = [slice(int(e) - k * int((part == i).sum()), int(e)) for i, e in enumerate(ends)]
+    ends = [0, *(k * np.cumsum(np.bincount(part, minlength=PARTS))).tolist()]
+    rows = [slice(*x) for x in pairwise(ends)]
     grams, sides = [A[r].T @ A[r] for r in rows], [A[r].T @ y[r] for r in rows]
     prior = frame.weight * np.diag(np.arange(A.shape[1]) < p)
     pull = np.zeros(len(prior))
     pull[:p] = frame.pull
-    is_given = np.array([i >= 0 and model.effects[i].effect.is_given for i in owner], dtype=bool)
+    is_given = np.array([s is not None and s.effect.is_given for s in owner], dtype=bool)
+    kept = [np.array([s is None or s is not out for s in owner], dtype=bool) for out in dropped]
     found, unlikely = np.empty((len(dropped), PARTS, k)), np.zeros(len(dropped))
     for i, out in enumerate(rows):
         G, b = sum(grams[:i] + grams[i + 1 :], prior), sum(sides[:i] + sides[i + 1 :], pull)
         C = np.zeros((len(prior), len(dropped)))
-        for d, effect in enumerate(dropped):
-            kept = np.array([j < 0 or model.effects[j] is not effect for j in owner], dtype=bool)
-            C[kept & is_given, d] = 1.0
-            free = np.flatnonzero(kept & ~is_given)
+        for d, here in enumerate(kept):
+            C[here & is_given, d] = 1.0
+            free = np.flatnonzero(here & ~is_given)
             right = b[free] - G[free] @ C[:, d]
             C[free, d] = np.linalg.lstsq(G[np.ix_(free, free)], right, rcond=1e-12)[0]
         r = (y[out, None] - A[out] @ C).reshape(-1, k, len(dropped))
@@ -62,10 +63,12 @@ def left_out(
     return found, unlikely
 
 
-def _columns_of(columns: Columns, model: Model, order: np.ndarray) -> tuple[np.ndarray, list[int]]:
+def _columns_of(
+    columns: Columns, model: Model, order: np.ndarray
+) -> tuple[np.ndarray, list[EffectAt | None]]:
     """Return the columns of bodies and effects, scaled, (N k, m), and the effect of each.
 
-    -1 for bodies; columns of effects whose coefficients are not given have unit length.
+    None for bodies; columns of effects whose coefficients are not given have unit length.
 
     Args:
         columns: of the recording.
@@ -74,12 +77,13 @@ def _columns_of(columns: Columns, model: Model, order: np.ndarray) -> tuple[np.n
     """
     equations, p = model.frame.equations, len(model.frame.R)
     parts = [columns.of(s, equations, model.w) for s in model.effects]
-    owner = [-1] * p + [i for i, x in enumerate(parts) for _ in range(x.shape[2])]
+    both = list(zip(model.effects, parts, strict=True))
+    owner = [None] * p + [s for s, x in both for _ in range(x.shape[2])]
     A = np.empty((*equations.d.shape, len(owner)))
     for j, base in enumerate(equations.bases):
         A[:, j, :p] = base[order, :p]
     at = p
-    for s, x in zip(model.effects, parts, strict=True):
+    for s, x in both:
         size = np.sqrt(((x / model.sigma[:, None]) ** 2).sum(axis=(0, 1))) + 1e-300
         A[:, :, at : at + len(size)] = x[order] / (1.0 if s.effect.is_given else size)
         at += len(size)
