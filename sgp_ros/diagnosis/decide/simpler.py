@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain
 
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.criteria import ALIKE
@@ -35,8 +36,8 @@ def simpler(equations: Equations, decision: Decision, scale: Scale) -> Model | N
             *_on_its_joints(s),
             *((law,) for law in _of_fewer_numbers(s, near)),
         ]
-        trials = (without_one(equations, model, s), *_exchanged(equations, model, s, laws))
-        for trial in trials:
+        without_it = (without_one(equations, model, s),)
+        for trial in chain(without_it, _exchanged(equations, model, s, laws)):
             if trial.effects and is_credible(trial) and scale.worth(trial) > least:
                 return trial
     return None
