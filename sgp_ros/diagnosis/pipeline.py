@@ -122,11 +122,11 @@ def diagnose(
         shares = before.nominal, model.left
         said = doubted_scales(connected.findings, model.effects, shares, tree)
         connected = replace(connected, findings=said)
-        found, several = _diagnosed(connected, robot.name, replays=has_overlays)
+        found, asserts = _diagnosed(connected, robot.name, replays=has_overlays)
+        connected = replace(connected, several=asserts)
         progress(1.0)
-        connected = replace(connected, several=several)
         if simulated is not None:
-            reference = against_model(connected.equations, several, simulated)
+            reference = against_model(connected.equations, connected.several, simulated)
             return _compared(found, connected, reference, ())
         if simulation is None:
             return found
