@@ -94,7 +94,9 @@ def test_errors_without_hope_are_not_compared(monkeypatch, verdict, gain, is_com
     assert bool(compared) is is_compared
 
 
-@pytest.mark.parametrize(('foresaw', 'is_said'), [(-1.0, True), (-1.0 - ALIKE, False)])
+@pytest.mark.parametrize(
+    ('foresaw', 'is_said'), [(50.0, True), (-1.0, True), (-1.0 - ALIKE, False)]
+)
 def test_an_error_is_said_that_fits_as_well_with_the_laws_found_without(
     monkeypatch, foresaw, is_said
 ):
@@ -110,7 +112,7 @@ def test_an_error_is_said_that_fits_as_well_with_the_laws_found_without(
     assert not said.findings
     assert bool(said.equivalents) is is_said
     if is_said:
-        assert said.trust == pytest.approx(1.0 / (1.0 + math.exp(TEMPER * foresaw)))
+        assert said.trust == pytest.approx(1.0 / (1.0 + math.exp(TEMPER * min(foresaw, 0.0))))
 
 
 @pytest.mark.parametrize(

@@ -163,23 +163,30 @@ def test_a_rare_law_beside_what_counts_as_physics_is_doubted(
     assert ('counts as physics' in said.why) is is_doubted
 
 
-@pytest.mark.parametrize('rippled', [(0,), (1,), (0, 1)])
-def test_a_law_that_says_the_same_at_another_joint_is_not_doubted(equations_for, rippled):
+@pytest.mark.parametrize(
+    ('name', 'rippled', 'is_doubted'),
+    [('coupled_friction', (0,), False), ('coupled_friction', (1,), False),
+     ('coupled_friction', (0, 1), True), ('quadratic_drag', (0,), True),
+     ('quadratic_drag', (1,), False)],
+)  # fmt: skip
+def test_a_law_that_says_the_same_at_another_joint_is_not_doubted(
+    equations_for, name, rippled, is_doubted
+):
     """A motor that turns with two joints rubs on both; at one of them nothing is left."""
 
     def force(_t, q, v):
-        rubs = 2.0 * sum(v)
-        return tuple(0.8 * math.sin(5.0 * q[j]) * (j in rippled) - rubs for j in range(2))
+        rubs = (2.0 * sum(v),) * 2 if name == 'coupled_friction' else (0.2 * abs(v[0]) * v[0], 0.0)
+        return tuple(0.8 * math.sin(5.0 * q[j]) * (j in rippled) - rubs[j] for j in range(2))
 
     _, equations = equations_for(simulate(CHAINS[2], 4, 10.0, force=force))
-    model = fitted(equations, 'coupled_friction')
+    model = fitted(equations, name)
     left = physics_left(equations, model, ())
     assert [bool(x) for x in left] == [j in rippled for j in range(2)]
     comparison = _comparison(equations, model)
     decision = replace(decide(equations, comparison), model=model, excess=np.zeros(2), unknown=())
     chances = Probabilities({s.key: 0.99 for s in model.effects}, np.zeros(2), None)
     (said,), _ = asserted(equations, decision, (), (), chances, ())
-    assert ('counts as physics' in said.why) is (len(rippled) == 2)
+    assert ('counts as physics' in said.why) is is_doubted
 
 
 def test_two_joints_that_rub_are_no_motor_that_turns_with_both(equations_for):

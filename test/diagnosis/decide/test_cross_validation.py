@@ -146,6 +146,23 @@ def test_parts_are_predicted_by_a_fit_to_the_others(damped, is_free):
     assert unlikely == pytest.approx(np.mean(priors), rel=1e-3)
 
 
+def test_a_law_is_left_out_with_or_without_coefficients(damped):
+    """As least squares on the rows that remain, with the force of a given law taken off."""
+    model = fitted(damped, 'viscous_friction', 'command_delay')
+    rubs, late = model.effects
+    assert [s.effect.is_given for s in (late, rubs)] == [True, False]
+    columns, part = Columns(damped), parts_of(len(damped.d))
+    x, given = (columns.of(s, damped)[:, 0, 0] for s in (rubs, late))
+    y = damped.d[:, 0]
+    found, _ = left_out(columns, model, (None, rubs, late))
+    for left, b, d in zip(found, (x, 0.0 * x, x), (y - given, y - given, y), strict=True):
+        for i in range(PARTS):
+            here = part == i
+            c = b[~here] @ d[~here] / max(b[~here] @ b[~here], 1e-300)
+            rest = d[here] - c * b[here]
+            assert left[i, 0] == pytest.approx(np.mean(rest**2), rel=1e-6)
+
+
 def test_an_effect_that_is_there_has_support_and_one_beside_it_none(damped):
     floor = 1e-5 * damped.power
     model = fitted(damped, 'viscous_friction', 'cogging')
