@@ -15,10 +15,10 @@ from sgp_ros.batch.least_squares import autocorrelation
 from sgp_ros.batch.posterior import BatchPosterior
 from sgp_ros.batch.regression_data import FilteredData
 from sgp_ros.errors import ConfigError, RecordingError
-from sgp_ros.gp.linear_algebra import svd
+from sgp_ros.gp.linear_algebra import column_scale, svd
 from sgp_ros.gp.methods import METHODS, FitOptions, Inputs
 from sgp_ros.gp.model import CoefficientPrior, Model, Observations
-from sgp_ros.gp.posterior import RANK_TOLERANCE, ZERO_COLUMN, column_scale
+from sgp_ros.gp.posterior import RANK_TOLERANCE, ZERO_COLUMN
 from sgp_ros.robots.robot import Robot
 
 FEWEST_ROWS = 10

@@ -50,6 +50,13 @@ class Block:
             return x / np.sqrt(self.noise)
         return linalg.solve_triangular(self.L, x, lower=True, trans='T', check_finite=False)
 
+    def by_sample(self, x: np.ndarray, n: int) -> np.ndarray:
+        """Return L^-T x of n samples times the gains of the components, (n, len(components))."""
+        alpha = self.unwhiten(x)[:, None]
+        if self.gain is None:
+            return alpha
+        return np.asarray((alpha * self.gain).reshape(n, -1, self.gain.shape[1]).sum(axis=1))
+
 
 def build_blocks(model: Model, data: Observations) -> list[Block]:
     """Factor and whiten all observations.

@@ -203,3 +203,16 @@ def exponents_numpy(products: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.nd
 def subtracted_numpy(H: np.ndarray, upper: np.ndarray) -> np.ndarray:
     """Return what `subtract_symmetric` leaves."""
     return H - np.triu(upper) - np.triu(upper, 1).T
+
+
+def column_scale(F: np.ndarray, root: np.ndarray) -> np.ndarray:
+    """Return a positive scale per column of the stacked rows of F (n, k, p) and root (r, p).
+
+    Raises:
+        NumericalError: the square of a number is not finite.
+    """
+    with np.errstate(over='ignore'):
+        scale = np.sqrt((F * F).sum(axis=(0, 1)) + (root * root).sum(axis=0))
+    require_finite(scale)
+    scale[scale == 0.0] = 1.0
+    return scale

@@ -10,12 +10,14 @@ matrix the components of X are coupled only by W and each has its own n x n fact
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import linalg
 
 from sgp_ros.gp.blocks import Block, build_blocks
 from sgp_ros.gp.linear_algebra import (
+    column_scale,
     column_space,
     null_space,
     require_finite,
@@ -202,6 +204,29 @@ class Posterior:
         _mark_undetermined(covariance, G, self._solution)
         return Prediction(mean, covariance)
 
+    def process_mean(self, U: np.ndarray) -> np.ndarray:
+        """Return the mean of Z at inputs U (q, d), (q, k).
+
+        `k*^T K^-1 (y - F w)`, that is O(k n) per query, with nothing solved for.
+        """
+        mean = np.zeros((len(U), len(self.model.kernels)))
+        for component, kernel in enumerate(self.model.kernels):
+            if kernel is not None:
+                mean[:, component] = kernel.matrix(U, self.data.U) @ self._weights[:, component]
+        return mean
+
+    @cached_property
+    def _weights(self) -> np.ndarray:
+        """Weight of each observation in the mean of Z, (n, k)."""
+        weights, start = np.zeros((len(self.data.U), len(self.model.kernels))), 0
+        for block in self._blocks:
+            stop = start + len(block.b)
+            weights[:, list(block.components)] = block.by_sample(
+                self._solution.residual[start:stop], len(weights)
+            )
+            start = stop
+        return weights
+
     def _cross(self, block: Block, column: int, U: np.ndarray) -> np.ndarray | None:
         kernel = self.model.kernels[block.components[column]]
         if kernel is None or block.L is None:
@@ -216,19 +241,6 @@ class Posterior:
         n = len(self.data.U)
         weighted = H * np.outer(block.gain[:, column], block.gain[:, column])
         return weighted.reshape(n, len(block.b) // n, n, -1).sum(axis=(1, 3))
-
-
-def column_scale(F: np.ndarray, root: np.ndarray) -> np.ndarray:
-    """Return a positive scale per column of the stacked rows of F (n, k, p) and root (r, p).
-
-    Raises:
-        NumericalError: the square of a number is not finite.
-    """
-    with np.errstate(over='ignore'):
-        scale = np.sqrt((F * F).sum(axis=(0, 1)) + (root * root).sum(axis=0))
-    require_finite(scale)
-    scale[scale == 0.0] = 1.0
-    return scale
 
 
 def _solve(A: np.ndarray, b: np.ndarray, data: Observations, prior: CoefficientPrior) -> _Solution:

@@ -42,6 +42,8 @@ def test_posterior_equals_equations_8_to_20(shape):
     np.testing.assert_allclose(prediction.mean, mean, atol=1e-9)
     np.testing.assert_allclose(prediction.covariance, covariance, atol=1e-9)
     assert posterior.log_evidence == pytest.approx(evidence, abs=1e-9)
+    alone = posterior.predict(U, np.zeros_like(F)).mean
+    np.testing.assert_allclose(posterior.process_mean(U), alone, atol=1e-9)
 
 
 @pytest.mark.parametrize('shape', SHAPES)

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -85,6 +86,8 @@ SIZE = 400
 CONDITIONED = 500
 """Rows that a prediction of a part left out is conditioned on."""
 MOST_NEIGHBOURS = 2
+_AT_ONCE = 2000
+"""Predictions whose covariances with the data are held at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,12 +123,15 @@ class Remainder:
         beyond the range of an input it becomes a part of what it is at its end, see `_beyond`.
         """
         U = process_inputs(motion, self.joint, sees_effort=self.sees_effort)[0] / self.scale
-        low, high = (end(self.seen, axis=0) for end in (np.min, np.max))
-        inside = np.clip(U, low, high)
+        inside = np.clip(U, *self._range)
         way = np.abs(U - inside)[:, list(self.used)].sum(axis=1)
-        rows = 2000
-        parts = [_mean(self.posterior, inside[i : i + rows]) for i in range(0, len(U), rows)]
-        return np.concatenate(parts) * (self.beyond + (1.0 - self.beyond) * np.exp(-way / EDGE))
+        mean = _mean(self.posterior, inside)
+        return mean * (self.beyond + (1.0 - self.beyond) * np.exp(-way / EDGE))
+
+    @cached_property
+    def _range(self) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest candidates on the rows of the recording, (d,) each."""
+        return self.seen.min(axis=0), self.seen.max(axis=0)
 
     def without(self, out: np.ndarray) -> Remainder:
         """Return the process as learned without some rows, (N,) of bool."""
@@ -202,7 +208,8 @@ def _beyond(model: Hyperparameters, U: np.ndarray, r: np.ndarray, used: tuple[in
 
 def _mean(posterior: Posterior, U: np.ndarray) -> np.ndarray:
     """Return the mean of Z at inputs (n, d), (n,) [N m or N]."""
-    return np.asarray(posterior.predict(U, np.zeros((len(U), 1, 0))).mean[:, 0])
+    rows = range(0, max(len(U), 1), _AT_ONCE)
+    return np.concatenate([posterior.process_mean(U[i : i + _AT_ONCE])[:, 0] for i in rows])
 
 
 def explained_share(
