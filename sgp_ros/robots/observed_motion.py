@@ -24,6 +24,8 @@ _BLOCK = 8000
 """Rows whose regressor is held at a time: that of a long recording would not fit in memory."""
 _DAMPING, _ROTOR = 'damping', ARMATURE.quantities[0].joint_number
 """Numbers of a joint: that which is part of the tree, and its inertia beside the bodies."""
+_STEP = 1e-6
+"""Change of position and velocity whose effect on efforts is a slope [rad or m, per second]."""
 STILL = 1e-9
 """Range of the position within which a joint does not move [rad or m]."""
 
@@ -208,23 +210,16 @@ class ObservedMotion:
         """Return the slopes of the nominal efforts, (n, k) each.
 
         They are the derivatives by position, velocity and acceleration of one joint: differences,
-        exact for the last two; that by the acceleration is a column of the mass matrix, its rotor
-        included.
+        exact for the last one, which is a column of the mass matrix, its rotor included.
         """
         if joint not in self._slopes:
             found = []
-            for which in range(2):
-                ends = []
-                for sign in (1.0, -1.0):
-                    states = [self.position, self.velocity, self.acceleration]
-                    states[which] = states[which].copy()
-                    states[which][:, joint] += sign * 1e-4
-                    ends.append(self.effort_for(*states))
-                found.append((ends[0] - ends[1]) / 2e-4)
-            pushed = self.acceleration + np.eye(self.tree.size)[joint]
-            by_a = self.effort_for(self.position, self.velocity, pushed) - self.nominal_effort
-            by_a[:, joint] += self.rotors[joint]
-            self._slopes[joint] = found[0], found[1], by_a
+            for which, step in enumerate((_STEP, _STEP, 1.0)):
+                states = [self.position, self.velocity, self.acceleration]
+                states[which] = states[which] + step * np.eye(self.tree.size)[joint]
+                found.append((self.effort_for(*states) - self.nominal_effort) / step)
+            found[2][:, joint] += self.rotors[joint]
+            self._slopes[joint] = found[0], found[1], found[2]
         return self._slopes[joint]
 
     @property

@@ -21,7 +21,7 @@ from sgp_ros.physics.formula import read_formula
 from sgp_ros.physics.law import FormulaLaw, LawParameter
 from sgp_ros.physics.place import Place
 from sgp_ros.physics.servo import Servo
-from sgp_ros.rigid.rigid_body import torque_regressor
+from sgp_ros.rigid.rigid_body import mass_matrix, torque_regressor
 from test.diagnosis.fitted_models import fitted
 from test.diagnosis.worlds import CHAINS, simulate
 
@@ -190,16 +190,55 @@ def test_slopes_of_motions_that_are_done_with_are_let_go(equations_for, heavy, m
     """Those of a long recording take hundreds of megabytes a model; asked again, the same."""
     _, equations = equations_for(heavy[2])
     columns = Columns(equations)
-    first, second = (columns.corrected(w) for w in np.eye(equations.base.shape[2])[:2])
+    bodies = np.random.default_rng(5).normal(size=(3, equations.size))
+    first, second = (columns.corrected(w) for w in bodies[:2])
     before = [x.copy() for x in first.effort_slopes(1)]
     assert first.remembered == 3 * first.position.size
     monkeypatch.setattr('sgp_ros.diagnosis.explain.regression.MOST_SLOPES', 0)
-    assert columns.corrected(np.eye(equations.base.shape[2])[0]) is first
+    assert columns.corrected(bodies[0]) is first
     assert first.remembered
-    columns.corrected(np.eye(equations.base.shape[2])[2])
+    columns.corrected(bodies[2])
     assert first.remembered == second.remembered == 0
     for one, other in zip(before, first.effort_slopes(1), strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def test_slopes_of_efforts_are_their_derivatives(equations_for, heavy):
+    """By position and velocity those of central differences, by acceleration the mass matrix."""
+    motion = equations_for(heavy[2])[1].motion
+    h = 1e-4 * np.eye(2)[1]
+    q, v, a = motion.position, motion.velocity, motion.acceleration
+    by_q, by_v, by_a = motion.effort_slopes(1)
+    scale = np.abs(by_a).max()
+    apart = motion.effort_for(q + h, v, a) - motion.effort_for(q - h, v, a)
+    np.testing.assert_allclose(by_q, apart / 2e-4, atol=1e-4 * np.abs(by_q).max())
+    apart = motion.effort_for(q, v + h, a) - motion.effort_for(q, v - h, a)
+    np.testing.assert_allclose(by_v, apart / 2e-4, atol=1e-4 * scale)
+    M = mass_matrix(motion.tree, motion.tree.parameters, q)
+    np.testing.assert_allclose(by_a, M[:, :, 1], atol=1e-9 * scale)
+
+
+@pytest.mark.parametrize('within', [1e-3, 0.05])
+def test_bodies_that_change_efforts_and_inertia_little_share_a_motion(
+    equations_for, heavy, within
+):
+    """By the root mean square of the efforts of each joint, and by the inertia at each joint."""
+    _, equations = equations_for(heavy[2])
+    columns, rng = Columns(equations), np.random.default_rng(6)
+    tree, q = equations.motion.tree, equations.poses[0].position
+    nominal = mass_matrix(tree, tree.parameters, q)
+    spread = [mass_matrix(tree, x, q) for x in equations.directions]
+    least = np.sqrt(sum(M**2 for M in spread))
+    for _ in range(20):
+        w = rng.normal(size=equations.size) * 10.0 ** rng.uniform(-5.0, 0.0)
+        force = np.sqrt((equations.force_of_bodies(w) ** 2).mean(axis=0) / equations.power)
+        M = mass_matrix(tree, w[equations.instants :] @ equations.directions, q)
+        inertia = np.abs(M / np.maximum(nominal, least))
+        is_near = force.max() <= within and np.einsum('njj->nj', inertia).max() <= within
+        assert (columns.corrected(w, within) is equations.motion) == is_near
+        there = columns.corrected(3.0 * w, within)
+        w[: equations.instants] += 1.0  # the instants of efforts are no bodies
+        assert columns.corrected(3.0 * w, within) is there
 
 
 def test_a_motor_that_delivers_half_is_as_exact_where_its_joint_is_held(equations_for, perfect):
