@@ -243,7 +243,8 @@ def _compared(
         found, reference='simulation', findings=reference.findings, shared=reference.shared,
         verdict='setup_error' if is_calm and connected.findings else reference.verdict,
         certainty=_certainty(reference.certainty, connected),
-        traces=replace(found.traces, forces=()), remarks=(*said, *found.remarks),
+        traces=replace(found.traces, forces=()),
+        remarks=(*said, *reference.remarks, *found.remarks),
         parameter_errors=found.parameter_errors if bodies is None else bodies,
     )  # fmt: skip
 

@@ -20,14 +20,21 @@ import numpy as np
 
 from sgp_ros.diagnosis.common_structure import Side, common_models
 from sgp_ros.diagnosis.compare.equations import Equations
+from sgp_ros.diagnosis.compare.power import moving_power
 from sgp_ros.diagnosis.criteria import COUNTED_SHARE, LEAST_SHARE, MOST_CERTAIN, PER_EFFECT, TEMPER
 from sgp_ros.diagnosis.decide.differences import Several
 from sgp_ros.diagnosis.findings import stated_parameters
 from sgp_ros.diagnosis.result import Finding, Location, Parameter, ParameterError
-from sgp_ros.diagnosis.wrong_bodies import parameter_errors
+from sgp_ros.diagnosis.wrong_bodies import parameter_errors, traded_remarks
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.place import Place, joint_name
+
+ALIKE = 0.15
+"""Difference, over the larger one, up to which levels of friction are alike [1]. Convention.
+
+One number stands for friction that grows with the load, falls with speed and wanes as it warms up.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +49,7 @@ class Reference:
         has_other_bodies: whether what bodies differ in counts as physics.
         bodies: of the machine that differ from those of the simulation; None where these are
             the nominal ones.
+        remarks: on numbers of bodies that differ and cannot be placed.
     """
 
     verdict: str
@@ -50,6 +58,7 @@ class Reference:
     certainty: float
     has_other_bodies: bool
     bodies: tuple[ParameterError, ...] | None = None
+    remarks: tuple[str, ...] = ()
 
 
 def against_simulation(
@@ -72,7 +81,7 @@ def against_simulation(
     is_free = any(d.model.is_free for d in decisions)
     ours, theirs = common_models(real, sim, is_free=is_free)
     known, named = sim.estimates(theirs), {s.key for s in sim.named}
-    power = _moving_power(equations)
+    power = moving_power(equations.motion, equations.power)
     findings: list[Finding] = []
     shared: list[Finding] = []
     for here, of_here in real.estimates(ours).values():
@@ -86,11 +95,15 @@ def against_simulation(
             - there.columns(equations.motion) @ there.coefficients
         )
         finding = replace(finding, share=_share(force, equations, power, here.place.joint))
-        is_different = finding.share > COUNTED_SHARE and finding.probability > 0.5
-        (findings if is_different else shared).append(_judged(finding, is_different=is_different))
+        (findings if _counts(finding, here) else shared).append(_judged(finding, here))
     found = _reference(equations, findings, shared, ours.w - theirs.w)
-    bodies = parameter_errors(equations, ours, unstated, theirs) if found.has_other_bodies else ()
-    return replace(found, bodies=bodies)
+    if not found.has_other_bodies:
+        return replace(found, bodies=())
+    bodies = parameter_errors(equations, ours, unstated, theirs)
+    return replace(
+        found, bodies=bodies,
+        remarks=tuple(traded_remarks(equations, ours, bodies, unstated, theirs)),
+    )  # fmt: skip
 
 
 def against_model(
@@ -111,7 +124,8 @@ def against_model(
     union = theirs | {s.key: s for s in real.named}
     models = [real.fitted(x, is_free=is_free) for x in (real.named, tuple(union.values()))]
     ours = max(models, key=real.scale.worth)
-    power, motion = _moving_power(equations), equations.motion
+    motion = equations.motion
+    power = moving_power(motion, equations.power)
     findings: list[Finding] = []
     shared: list[Finding] = []
     for here, std in real.estimates(ours).values():
@@ -123,10 +137,8 @@ def against_model(
         else:
             finding = _compared(here, there, (std, {}), equations)
             force = here.force(motion) - there.force(motion)
-        share = _share(force, equations, power)
-        is_different = share > COUNTED_SHARE and finding.probability > 0.5
-        finding = _judged(replace(finding, share=share), is_different=is_different)
-        (findings if is_different else shared).append(finding)
+        finding = replace(finding, share=_share(force, equations, power))
+        (findings if _counts(finding, here) else shared).append(_judged(finding, here))
     with_all = real.estimates(models[1]) if theirs else {}
     for there in theirs.values():
         share = _share(there.force(motion), equations, power)
@@ -145,8 +157,9 @@ def _reference(
     equations: Equations, findings: list[Finding], shared: list[Finding], shift: np.ndarray
 ) -> Reference:
     """Return the comparison; `shift` (p,) is by how much the bodies differ."""
-    moved = (equations.force_of_bodies(shift) ** 2).mean(axis=0) / _moving_power(equations)
-    is_other = bool(moved.max() > COUNTED_SHARE)
+    moved = (equations.force_of_bodies(shift) ** 2).mean(axis=0)
+    power = moving_power(equations.motion, equations.power)
+    is_other = bool((moved > COUNTED_SHARE * power).any())
     calm = 'parameters_only' if is_other else 'no_mismatch'
     findings.sort(key=lambda f: -f.probability)
     verdict = 'missing_physics' if findings else calm
@@ -165,12 +178,29 @@ def _sized(found: Finding, law: EffectAt) -> Finding:
     return replace(found, in_simulation=theirs, difference=apart)
 
 
-def _judged(found: Finding, *, is_different: bool) -> Finding:
+def _counts(found: Finding, law: EffectAt) -> bool:
+    """Return whether the numbers of a law on both sides differ by what counts as physics."""
+    is_known = found.share > COUNTED_SHARE and found.probability > 0.5
+    return is_known and not _is_alike(found, law)
+
+
+def _is_alike(found: Finding, law: EffectAt) -> bool:
+    """Return whether the sizes of a law that nearly every joint has are `ALIKE`."""
+    numbers = ((float(found.parameters[n].value), float(x.value))
+               for n, x in found.difference.items())  # fmt: skip
+    return law.effect.is_usual and all(
+        abs(apart) < ALIKE * max(abs(ours), abs(ours - apart)) for ours, apart in numbers
+    )
+
+
+def _judged(found: Finding, law: EffectAt) -> Finding:
     """Return a finding; if shared, as probable as it is alike, or why its numbers may differ."""
-    if is_different:
+    if _counts(found, law):
         return found
     if found.probability > 0.5:
-        return replace(found, why='they differ by too little to count')
+        is_small = found.share <= COUNTED_SHARE
+        return replace(found, why='they differ by too little to count' if is_small else (
+            'they differ by no more than friction does with load, speed and warmth'))  # fmt: skip
     return replace(found, probability=min(1.0 - found.probability, MOST_CERTAIN))
 
 
@@ -229,17 +259,6 @@ def _share(force: np.ndarray, equations: Equations, power: np.ndarray, joint: in
     if force.ndim == 1:
         moving, power = moving[:, joint], power[joint]
     return float(np.max(((force * moving) ** 2).mean(axis=0) / power))
-
-
-def _moving_power(equations: Equations) -> np.ndarray:
-    """Return the mean squares of what moves the joints, efforts less those of gravity, (k,)."""
-    motion = equations.motion
-    still = np.zeros_like(motion.position)
-    held = motion.effort_for(motion.position, still, still)
-    k = motion.tree.size
-    driven = motion.tree.is_actuated[:k]
-    moving = ((motion.effort - held) ** 2).mean(axis=0)
-    return np.where(driven & (moving > 0.0), np.minimum(moving, equations.power), equations.power)
 
 
 def _evidence_of_any(law: EffectAt, numbers: Mapping[str, Parameter]) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 
@@ -40,11 +41,10 @@ def parameter_errors(
     """
     if not model.is_free:
         return ()
+    stated = _stated(equations, other)
     if other is not None:
-        change = model.w, _of_bodies(model) + _of_bodies(other)
-        stated = equations.with_bodies(equations.motion, other.w).tree.parameters
+        change = _apart(model, other)
         return tuple(filter(_differs, _numbers(equations, *change, stated, unstated)[0]))
-    stated = equations.motion.tree.parameters
     alone, beside = (_numbers(equations, *_changed(m), stated, unstated)[0]
                      for m in (model, _with_offsets(equations, model)))  # fmt: skip
     moved = {(e.link, e.parameter): e for e in beside}
@@ -72,9 +72,11 @@ def _widened(e: ParameterError, beside: ParameterError) -> ParameterError:
 
 def traded_remarks(
     equations: Equations, model: Model, errors: Sequence[ParameterError],
-    unstated: Collection[int] = (),
+    unstated: Collection[int] = (), other: Model | None = None,
 ) -> Iterator[str]:  # fmt: skip
     """Yield sentences on numbers that must differ beside `errors`, if the rest is as stated.
+
+    Or as another machine has them, whose efforts then share the constant forces of this one.
 
     Numbers of several bodies may do the same, so that none is known by itself. Of changes
     `x ~ N(x_hat, C)`, a set u costs `x_u' C_uu^-1 x_u / 2` nats if it stays as stated, and the
@@ -85,11 +87,12 @@ def traded_remarks(
     if not model.is_free:
         return
     told = {(e.link, e.parameter) for e in errors}
-    stated = equations.motion.tree.parameters
-    alone, beside = (
-        _numbers(equations, m.w, _of_bodies(m), stated, unstated)
-        for m in (model, _with_offsets(equations, model))
-    )
+    stated = _stated(equations, other)
+    if other is None:
+        changes = [(m.w, _of_bodies(m)) for m in (model, _with_offsets(equations, model))]
+    else:
+        changes = [(model.w, _of_bodies(model) + _of_bodies(other))] * 2
+    alone, beside = (_numbers(equations, *change, stated, unstated) for change in changes)
     numbers, (x, C, _), plain = alone[0], _in_units(*beside), _in_units(*alone)
     held = [i for i, e in enumerate(numbers) if (e.link, e.parameter) not in told]
     asked = max(EVIDENCE, STRUCTURE_LEAST_SHARE * _cost(x, C, [*range(len(x))]))
@@ -174,31 +177,77 @@ def _numbers(
     return numbers, np.asarray(S @ C @ S.T)
 
 
-def _changed(model: Model) -> tuple[np.ndarray, np.ndarray]:
-    """Return the change of the bodies, (p,), and its covariance, (p, p); of one if that will do.
+def _stated(equations: Equations, other: Model | None) -> np.ndarray:
+    """Return the parameters of the nominal robot, or of another machine, (b, 10)."""
+    if other is None:
+        return equations.motion.tree.parameters
+    return equations.with_bodies(equations.motion, other.w).tree.parameters
 
-    The others cost `|R (w - x)|^2 / (2 weight)` [nats] if they stay as stated. That must be less
-    than the price of the numbers they determine, and of no other body nearly as little.
-    """
-    frame, equations = model.frame, model.frame.equations
-    at = equations.instants
-    owned = np.asarray(equations.directions.reshape(len(frame.R) - at, -1, 10).any(axis=2))
-    found = []
-    for body in range(owned.shape[1] if (owned.sum(axis=1) <= 1).all() else 0):
-        kept = np.flatnonzero(np.concatenate([np.ones(at, dtype=bool), owned[:, body]]))
-        some = replace(frame, R=np.asarray(np.linalg.qr(frame.R[:, kept], mode='r')))
-        x = np.linalg.lstsq(frame.R[:, kept], frame.R @ model.w, rcond=None)[0]
-        lost = frame.R @ model.w - frame.R[:, kept] @ x
-        found.append((0.5 * float(lost @ lost) / frame.weight, body, kept, x, some))
-    found.sort(key=lambda item: item[0])
-    if len(found) < 2 or found[1][0] < found[0][0] + ALIKE:
+
+def _changed(model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Return the change of the bodies (p,) and its covariance (p, p); of one if that will do."""
+    frame = model.frame
+    at, root = frame.equations.instants, frame.R / math.sqrt(frame.weight)
+    alone = _one_body(frame.equations, root, model.w)
+    if alone is None:
         return model.w, _of_bodies(model)
-    cost, _, kept, x, some = found[0]
-    if cost > PER_PARAMETER * (frame.determined - some.determined):
-        return model.w, _of_bodies(model)
+    kept, x = alone
+    some = replace(frame, R=np.asarray(np.linalg.qr(frame.R[:, kept], mode='r')))
     w, C = np.zeros_like(model.w), np.zeros_like(frame.R)
     w[kept], C[np.ix_(kept, kept)] = x, some.covariance
     return w, C[at:, at:]
+
+
+def _apart(model: Model, other: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Return the bodies of a model, (p,), and the covariance, (p, p), of their difference.
+
+    They differ in one body from those of another model, if that will do.
+    """
+    equations, C = model.frame.equations, _of_bodies(model) + _of_bodies(other)
+    at, frames = equations.instants, (model.frame, other.frame)
+    usual = sum(f.weight * np.linalg.inv(f.R.T @ f.R)[-len(C) :, -len(C) :] for f in frames)
+    root = np.linalg.cholesky(np.linalg.inv(usual)).T
+    alone = _one_body(equations, root, (model.w - other.w)[at:], prior=2.0)
+    if alone is None:
+        return model.w, C
+    kept, x = alone
+    w, S = other.w.copy(), np.zeros_like(C)
+    w[at + kept] += x
+    S[np.ix_(kept, kept)] = np.linalg.inv(np.linalg.inv(C)[np.ix_(kept, kept)])
+    return w, S
+
+
+def _one_body(
+    equations: Equations, root: np.ndarray, w: np.ndarray, prior: float = 1.0
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return which of the changes (p,) may differ, and how, if those of one body will do.
+
+    The others cost `|R (w - x)|^2 / 2` [nats] if they stay as stated. That must be less than the
+    price of the numbers they determine, and of no other body nearly as little.
+
+    Args:
+        equations: of the recording.
+        root: R, of the information on the changes, which may begin with instants, (p, p).
+        w: changes (p,).
+        prior: their variance without a recording.
+    """
+    at = len(root) - len(equations.directions)
+    owned = np.asarray(equations.directions.reshape(len(root) - at, -1, 10).any(axis=2))
+    found = []
+    for body in range(owned.shape[1] if (owned.sum(axis=1) <= 1).all() else 0):
+        kept = np.flatnonzero(np.concatenate([np.ones(at, dtype=bool), owned[:, body]]))
+        x = np.linalg.lstsq(root[:, kept], root @ w, rcond=None)[0]
+        lost = root @ w - root[:, kept] @ x
+        found.append((0.5 * float(lost @ lost), body, kept, x))
+    found.sort(key=lambda item: item[0])
+    if len(found) < 2 or found[1][0] < found[0][0] + ALIKE:
+        return None
+    cost, _, kept, x = found[0]
+    of_all, of_one = (
+        int((np.linalg.svd(R, compute_uv=False) > math.sqrt(2.0 / prior)).sum())
+        for R in (root, root[:, kept])
+    )
+    return None if cost > PER_PARAMETER * (of_all - of_one) else (kept, x)
 
 
 def _of_bodies(model: Model) -> np.ndarray:

@@ -14,6 +14,7 @@ from sgp_ros.diagnosis.decide.certainty import settled_of
 from sgp_ros.diagnosis.decide.differences import decide_several
 from sgp_ros.diagnosis.reference import (
     _compared,
+    _counts,
     _judged,
     _sized,
     against_model,
@@ -78,18 +79,30 @@ def test_laws_that_are_refused_do_not_differ_from_a_simulation(
 
 
 @pytest.mark.parametrize(
-    ('apart', 'is_different', 'probability', 'has_reason'),
-    [(0.9, True, 0.9, False), (0.9, False, 0.9, True), (0.05, False, 0.95, False),
-     (0.0, False, 0.99, False)],
+    ('apart', 'share', 'theirs', 'probability', 'why'),
+    [(0.9, 1.0, 0.6, 0.9, None), (0.9, 1e-3, 0.6, 0.9, 'too little'),
+     (0.9, 1.0, 0.9, 0.9, 'warmth'), (0.9, 1.0, 1.1, 0.9, 'warmth'), (0.9, 1.0, 1.2, 0.9, None),
+     (0.9, 1.0, -1.0, 0.9, None), (0.05, 1.0, 0.6, 0.95, None), (0.0, 1.0, 0.6, 0.99, None)],
 )  # fmt: skip
-def test_what_both_have_is_as_probable_as_it_is_alike(
-    apart, is_different, probability, has_reason
-):
+def test_what_both_have_is_as_probable_as_it_is_alike(apart, share, theirs, probability, why):
     """A difference that is seen, but counts too little, is said with its reason."""
-    found = Finding('knee', 'armature', {}, Location(), 1.0, apart, 1.0)
-    judged = _judged(found, is_different=is_different)
+    ours = {'level': Parameter(1.0, 0.01, 'N m')}
+    found = Finding('knee', 'coulomb_friction', ours, Location(), 1.0, apart, share,
+                    difference={'level': Parameter(1.0 - theirs, 0.01, 'N m')})  # fmt: skip
+    law = EffectAt(EFFECTS['coulomb_friction'], Place(0))
+    judged = _judged(found, law)
     assert judged.probability == pytest.approx(probability)
-    assert bool(judged.why) is has_reason
+    assert (why or '') in (judged.why or '')
+    assert bool(judged.why) is bool(why)
+    assert _counts(found, law) is (why is None and apart > 0.5)
+
+
+def test_only_what_nearly_every_joint_has_may_differ_by_a_tenth():
+    """A spring that is a little stiffer in the machine is another one."""
+    numbers = {'stiffness': Parameter(1.0, 0.01, 'N m/rad')}
+    apart = {'stiffness': Parameter(0.1, 0.01, 'N m/rad')}
+    found = Finding('knee', 'spring', numbers, Location(), 1.0, 0.9, 1.0, difference=apart)
+    assert _counts(found, EffectAt(EFFECTS['spring'], Place(0)))
 
 
 def test_a_law_that_the_simulation_is_not_known_to_have_has_no_place_there():

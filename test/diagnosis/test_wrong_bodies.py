@@ -37,6 +37,33 @@ def test_one_wrong_body_is_told_with_its_numbers(equations_for, link, mass, cent
     assert ('mass' if mass > 1.0 else 'com_z') in by_name
 
 
+@pytest.mark.parametrize('wrong', [1, 2])
+def test_what_differs_from_another_machine_is_told_as_one_body_or_as_traded(equations_for, wrong):
+    """Both differ from the file alike; of two bodies that differ no number is known by itself."""
+    first, second = CHAINS[2]
+    first = replace(first, mass=1.2 * first.mass)
+    loaded = replace(second, mass=1.3 * second.mass)
+    moved = first
+    if wrong == 2:
+        moved = replace(first, mass=1.5 * first.mass)
+        loaded = replace(second, centre=1.3 * second.centre)
+    (_, ours), (_, theirs) = (
+        equations_for(simulate(chain, seed))
+        for seed, chain in ((5, (moved, loaded)), (6, (first, second)))
+    )
+    here, there = (fitted(x, is_free=True) for x in (ours, theirs))
+    found = parameter_errors(ours, here, other=there)
+    said = list(traded_remarks(ours, here, found, other=there))
+    if wrong == 2:
+        assert said
+        return
+    assert not said
+    mass = {e.parameter: e for e in found}['mass']
+    assert mass.link == ours.motion.tree.link_names[1]
+    assert mass.value - mass.nominal == pytest.approx(0.3 * second.mass, rel=0.05)
+    assert {e.link for e in found} == {mass.link}
+
+
 def test_two_wrong_bodies_are_not_told_as_one(equations_for):
     """Of a chain whose first link is longer in its centre, and whose second is lighter."""
     first, second = CHAINS[2]

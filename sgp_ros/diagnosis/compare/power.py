@@ -86,3 +86,15 @@ def _accelerated(tree: Tree, q: np.ndarray, joint: int) -> np.ndarray:
     return np.asarray(
         (torque_regressor(tree, q, still, a) - torque_regressor(tree, q, still, still))[:, joint]
     )
+
+
+def moving_power(motion: ObservedMotion, power: np.ndarray) -> np.ndarray:
+    """Return the mean squares of what moves the joints, (k,) [N^2 m^2 or N^2].
+
+    That is efforts less those of gravity, where there is a motor; no more than `power` (k,).
+    """
+    still = np.zeros_like(motion.position)
+    held = motion.effort_for(motion.position, still, still)
+    driven = motion.tree.is_actuated[: motion.tree.size]
+    moving = ((motion.effort - held) ** 2).mean(axis=0)
+    return np.where(driven & (moving > 0.0), np.minimum(moving, power), power)
