@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import chain
 
+import numpy as np
+
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import ALIKE
+from sgp_ros.diagnosis.criteria import ALIKE, INTERVAL
 from sgp_ros.diagnosis.decide.cross_validation import without
 from sgp_ros.diagnosis.decide.decision import Decision
 from sgp_ros.diagnosis.decide.scale import Scale
@@ -14,6 +16,7 @@ from sgp_ros.diagnosis.explain.candidates import fit
 from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.place import Place
@@ -23,7 +26,8 @@ def simpler(equations: Equations, decision: Decision, scale: Scale) -> Model | N
     """Return a model without a law that few joints have and that is hardly worth more.
 
     With its plain law in its place, where there is one, on either joint or both if it has two; or
-    a usual one that looks alike, or a law of fewer numbers that a rival has there.
+    a usual one that looks alike, or a law of fewer numbers that a rival has there. Where what it
+    adds to its plain law may be nothing, this takes its place if it leaves no physics.
     """
     model = decision.model
     least = scale.worth(model) - ALIKE
@@ -40,7 +44,32 @@ def simpler(equations: Equations, decision: Decision, scale: Scale) -> Model | N
         for trial in chain(without_it, _exchanged(equations, model, s, laws)):
             if trial.effects and is_credible(trial) and scale.worth(trial) > least:
                 return trial
+        plain = without_it[0]
+        is_plain = bool(s.effect.plain) and (s.effect.plain[0], s.place) in plain.key
+        if (
+            is_plain
+            and adds_nothing(equations, model, s)
+            and not (scale.excess(plain) >= np.maximum(scale.excess(model), 1.0)).any()
+        ):
+            return plain
     return None
+
+
+def adds_nothing(equations: Equations, model: Model, effect: EffectAt) -> bool:
+    """Return whether the 95 % interval of all that sets a law apart from its plain one is none.
+
+    Such as friction that grows with a load which hardly changes.
+    """
+    known = {q.name for q in EFFECTS[effect.effect.plain[0]].quantities}
+    own = [q for q in effect.sizes if q.name not in known]
+    if len(own) == len(effect.sizes) or not own:
+        return False
+    index = [s is effect for s in model.effects].index(True)
+    std = reported_std(model, Columns(equations))[index]
+    numbers = effect.report(equations.motion)
+    return all(
+        abs(float(numbers[q.name]) - q.neutral) < INTERVAL * std.get(q.name, 0.0) for q in own
+    )
 
 
 def _on_its_joints(effect: EffectAt) -> Iterator[tuple[EffectAt, ...]]:

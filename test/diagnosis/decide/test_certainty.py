@@ -18,6 +18,7 @@ from sgp_ros.diagnosis.criteria import (
     LEAST_SHARE,
 )
 from sgp_ros.diagnosis.decide import certainty
+from sgp_ros.diagnosis.decide import simpler as simpler_models
 from sgp_ros.diagnosis.decide.certainty import (
     Probabilities,
     certainty_of,
@@ -233,6 +234,29 @@ def test_a_law_of_fewer_numbers_that_is_worth_as_much_is_named(equations_for):
     far = SimpleNamespace(worth=lambda m: 2.0 * ALIKE * (m is model))
     assert simpler(equations, SimpleNamespace(model=model, rivals=(rival,)), far) is None
     assert simpler(equations, SimpleNamespace(model=rival, rivals=(model,)), alike) is None
+
+
+@pytest.mark.parametrize(
+    ('spread', 'excess', 'is_plain'), [(0.1, 0.5, True), (0.1, 1.5, False), (0.01, 0.5, False)]
+)
+def test_friction_whose_growth_with_the_load_may_be_none_is_plain(
+    rubbing, monkeypatch, spread, excess, is_plain
+):
+    """However much better it fits: its numbers say that it may be plain, unless much is left."""
+    model = fitted(rubbing, 'load_friction', 'viscous_friction')
+    (load,) = (s for s in model.effects if s.name == 'load_friction')
+    mu = abs(float(load.report(rubbing.motion)['mu']))
+    std = [{'level': 0.01, 'mu': mu * spread / 0.05} if s is load else {'b': 0.1}
+           for s in model.effects]  # fmt: skip
+    monkeypatch.setattr(simpler_models, 'reported_std', lambda *_: std)
+    scale = SimpleNamespace(
+        worth=lambda m: 2.0 * ALIKE * (load.key in m.key),
+        excess=lambda m: np.full(1, 0.5 if load.key in m.key else excess),
+    )
+    found = simpler(rubbing, SimpleNamespace(model=model, rivals=()), scale)
+    assert (found is not None) is is_plain
+    if found is not None:
+        assert {s.name for s in found.effects} == {'coulomb_friction', 'viscous_friction'}
 
 
 def _worth_of_gains(model):
