@@ -34,10 +34,11 @@ from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model, adds_to_usual
 from sgp_ros.diagnosis.explain.joint_search import usual
 from sgp_ros.diagnosis.explain.regression import Columns
-from sgp_ros.diagnosis.unlisted.beside import PLAIN, acts_as_bodies, law_of, own_effects, says_less
+from sgp_ros.diagnosis.unlisted.beside import PLAIN, acts_as_bodies, law_of, own_effects
 from sgp_ros.diagnosis.unlisted.search import search
 from sgp_ros.diagnosis.unlisted.searched import Searched, leaves_more
 from sgp_ros.diagnosis.unlisted.shapes import smooth_of
+from sgp_ros.diagnosis.unlisted.shorter import idle
 from sgp_ros.diagnosis.unlisted.tried import is_beaten, promises
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.place import Place
@@ -260,7 +261,7 @@ def _in_plain_laws(
     plain = fit(columns, most.effects, most.sigma, is_free=most.is_free, w=most.w, steps=_STEPS)
     is_near = best.mean_square[joint] > NEARLY * plain.mean_square[joint]
     is_as_good = is_near or scale.worth(best) < scale.worth(plain) + ALIKE
-    return plain if is_as_good or says_less(columns, best, joint) else None
+    return plain if is_as_good or idle(columns, best, joint) else None
 
 
 def _objection(equations: Equations, comparison: Comparison, searched: Searched) -> str:

@@ -23,7 +23,7 @@ from sgp_ros.diagnosis.explain.credibility import is_credible
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.explain.screening import distinct, screen
-from sgp_ros.diagnosis.explain.uncertainty import reported_std
+from sgp_ros.diagnosis.unlisted.searched import leaves_more
 from sgp_ros.diagnosis.unlisted.shapes import SmoothForce
 from sgp_ros.physics.catalogue import CONSTANT_LOAD, COULOMB_FRICTION, VISCOUS_FRICTION
 from sgp_ros.physics.effect import Effect
@@ -34,8 +34,6 @@ from sgp_ros.physics.place import JOINT, MOTOR, Place
 PLAIN = (COULOMB_FRICTION, VISCOUS_FRICTION, CONSTANT_LOAD)
 _FURTHER = 3
 """Listed laws that are tried beside a formula which leaves too much, and that may be added."""
-_NONE = 2.0
-"""Standard deviations below which a coefficient is not distinguished from zero."""
 
 
 def law_of(model: Model, joint: int) -> EffectAt | None:
@@ -128,7 +126,9 @@ def refined(
             base = fit(columns, others, model.sigma, is_free=model.is_free, w=model.w,
                        still=len(others))  # fmt: skip
             trials += tried(kept, distinct(screen(columns, base, richer, (joint,))))
-    is_left = scale.excess(model)[joint] > 1.0
+    law = law_of(model, joint)
+    is_left = bool(scale.excess(model)[joint] > 1.0)
+    is_left = is_left or bool(law and leaves_more(model.frame.equations, model, law))
     if is_left:
         for s in distinct(screen(columns, model, laws, (joint,)), _FURTHER):
             friction = (x for j in {joint, s.place.source} - {-1} for x in _friction(j))
@@ -138,21 +138,6 @@ def refined(
     if scale.worth(best) <= scale.worth(model):
         return model
     return refined(columns, scale, best, joint, most - 1) if is_left and most > 1 else best
-
-
-def says_less(columns: Columns, model: Model, joint: int) -> bool:
-    """Return whether a formula has a coefficient that is hardly zero: a shorter one would do."""
-    law = law_of(model, joint)
-    assert law is not None
-    index = [s is law for s in model.effects].index(True)
-    std = reported_std(model, columns)[index]
-    numbers = law.report(columns.equations(frozenset()).motion)
-    names = [q.name for q in law.effect.coefficient_quantities(law.kind)]
-    return any(
-        abs(float(numbers[name])) < _NONE * std[name]
-        for name in names
-        if name in numbers and name in std and np.isfinite(std[name])
-    )
 
 
 def is_slight(listed: Model, smooth: Model, joint: int) -> bool:

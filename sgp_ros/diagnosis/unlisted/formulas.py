@@ -125,11 +125,11 @@ class FoundLaw(FormulaLaw):
     has_chosen_form = True
 
     def __init__(
-        self, smooth: SmoothForce, formula: Formula, joint: str,
+        self, smooth: SmoothForce, text: str, formula: Formula, joint: str,
         parameters: Sequence[LawParameter], words: str, price: float,
     ) -> None:  # fmt: skip
         super().__init__(formula, joint, parameters, words, is_open=True, price=price)
-        self.smooth = smooth
+        self.smooth, self.text = smooth, text
         if not smooth.is_of_own_speed:
             self.is_dry = smooth.is_dry
 
@@ -237,7 +237,7 @@ def law(
     words = NEAREST.get(f'{text.removesuffix(" + d")} {gate}'.strip(), NAMELESS)
     price = PER_UNUSUAL + PER_PIECE * _pieces(formula)
     joint = motion.tree.moving_names[smooth.joint]
-    return FoundLaw(smooth, formula, joint, parameters, words, price)
+    return FoundLaw(smooth, text, formula, joint, parameters, words, price)
 
 
 def _shape(

@@ -28,7 +28,6 @@ from sgp_ros.diagnosis.unlisted.beside import (
     law_of,
     own_effects,
     refined,
-    says_less,
 )
 from sgp_ros.diagnosis.unlisted.curves import left_out
 from sgp_ros.diagnosis.unlisted.formulas import FoundLaw, curve_of, formulas, nodes_of
@@ -42,6 +41,7 @@ from sgp_ros.diagnosis.unlisted.shapes import (
     smooth_of,
     unlike,
 )
+from sgp_ros.diagnosis.unlisted.shorter import idle, shorter
 from sgp_ros.diagnosis.unlisted.tried import (
     as_factor,
     is_beaten,
@@ -109,7 +109,8 @@ def search(
         ranked = look.best([*ranked, *(x for m in products for x in look.formulas(m, FITTED))])
     again = [earned(look.columns, scale, m, joint) for m in ranked[:EARNED]]
     ranked = without_limits(look.best([*again, *ranked[EARNED:]]), scale, joint)
-    first = (i for i, m in enumerate(ranked) if not says_less(columns, m, joint))
+    ranked = look.best([*ranked, *(x for m in ranked[:1] for x in shorter(columns, m, joint))])
+    first = (i for i, m in enumerate(ranked) if not idle(columns, m, joint))
     ranked = ranked[next(first, 0) :]
     ranked[:1] = [refined(look.columns, scale, m, joint) for m in ranked[:1]]
     free = look.free(ranked[0]) if ranked else np.zeros(0)

@@ -130,8 +130,15 @@ def test_a_force_that_other_bodies_would_have_is_told_from_one_that_no_body_has(
     assert not acts_as_bodies(alone, 1.3 * alone.bases[0][:, alone.instants], 0)
 
 
-def test_few_laws_are_added_beside_a_formula_however_much_each_is_worth(monkeypatch):
-    """Beside a formula that is wrong every law is worth something."""
+@pytest.mark.parametrize(
+    ('excess', 'is_much', 'added'),
+    [(2.0, True, beside._FURTHER), (2.0, False, beside._FURTHER),
+     (0.5, True, beside._FURTHER), (0.5, False, 0)],
+)  # fmt: skip
+def test_few_laws_are_added_beside_a_formula_however_much_each_is_worth(
+    monkeypatch, excess, is_much, added
+):
+    """Where more is left than a model may, or a law; beside a wrong one all is worth something."""
     motion = SimpleNamespace(catalogue={})
 
     def model(effects):
@@ -144,12 +151,13 @@ def test_few_laws_are_added_beside_a_formula_however_much_each_is_worth(monkeypa
         'far_and_near': lambda m, _: ((), m.effects), 'own_effects': lambda *_: (),
         'screen': lambda *_: [at], 'distinct': lambda found, _: found, '_friction': lambda _: (),
         'fit': lambda _, effects, *__, **___: model(effects), 'is_credible': lambda _: True,
-        'earned': lambda _columns, _scale, m, _joint: m,
+        'earned': lambda _columns, _scale, m, _joint: m, 'law_of': lambda *_: at,
+        'leaves_more': lambda *_: is_much,
     }  # fmt: skip
     for name, fake in fakes.items():
         monkeypatch.setattr(beside, name, fake)
-    scale = SimpleNamespace(excess=lambda _: np.full(1, 2.0), worth=lambda m: len(m.effects))
-    assert len(beside.refined(None, scale, model(()), 0).effects) == beside._FURTHER
+    scale = SimpleNamespace(excess=lambda _: np.full(1, excess), worth=lambda m: len(m.effects))
+    assert len(beside.refined(None, scale, model(()), 0).effects) == added
 
 
 @pytest.mark.parametrize(
