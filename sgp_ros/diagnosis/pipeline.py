@@ -25,7 +25,7 @@ from sgp_ros.diagnosis.decide.certainty import (
 )
 from sgp_ros.diagnosis.decide.differences import Several, without_laws_of
 from sgp_ros.diagnosis.decide.equivalence import Contrasts, equivalents
-from sgp_ros.diagnosis.decide.reasons import left_remarks
+from sgp_ros.diagnosis.decide.reasons import disagreement, left_remarks
 from sgp_ros.diagnosis.decide.visibility import hides_friction, visibility
 from sgp_ros.diagnosis.disturbed import undisturbed
 from sgp_ros.diagnosis.explain.comparison import Comparison
@@ -50,7 +50,6 @@ from sgp_ros.diagnosis.reference import (
     Reference,
     against_model,
     against_simulation,
-    disagreement,
     none_in_simulation,
 )
 from sgp_ros.diagnosis.result import Diagnosis, Proof

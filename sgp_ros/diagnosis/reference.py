@@ -15,13 +15,20 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from sgp_ros.diagnosis.common_structure import Side, common_models
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.compare.power import moving_power
-from sgp_ros.diagnosis.criteria import COUNTED_SHARE, LEAST_SHARE, MOST_CERTAIN, PER_EFFECT, TEMPER
+from sgp_ros.diagnosis.criteria import (
+    COUNTED_SHARE,
+    INTERVAL,
+    MOST_CERTAIN,
+    PER_EFFECT,
+    TEMPER,
+)
 from sgp_ros.diagnosis.decide.differences import Several
 from sgp_ros.diagnosis.findings import stated_parameters
 from sgp_ros.diagnosis.result import Finding, Location, Parameter, ParameterError
@@ -88,8 +95,7 @@ def against_simulation(
         there, of_there = known[here.key]
         is_known = here.key in named
         finding = _compared(here, there, (of_here, of_there), equations, is_in_simulation=is_known)
-        if not is_known:
-            finding = _sized(finding, here)
+        finding = _sized(finding, here, is_in_simulation=is_known)
         force = (
             here.columns(equations.motion) @ here.coefficients
             - there.columns(equations.motion) @ there.coefficients
@@ -169,13 +175,20 @@ def _reference(
     return Reference(verdict, tuple(findings), tuple(shared), certainty, is_other)
 
 
-def _sized(found: Finding, law: EffectAt) -> Finding:
-    """Return a finding with the sizes alone of a law that the simulation is not known to have."""
-    theirs = {
-        q.name: found.in_simulation[q.name] for q in law.sizes if q.name in found.in_simulation
+def _sized(found: Finding, law: EffectAt, *, is_in_simulation: bool) -> Finding:
+    """Return a finding with the sizes alone of a law on a side that may have none of it.
+
+    A spring without stiffness has no rest position.
+    """
+    sizes, sides = {q.name for q in law.sizes}, ['difference']
+    sides += [] if is_in_simulation else ['in_simulation']
+    sides += ['parameters'] * (_evidence_of_any(law, found.parameters) < 0.5 * INTERVAL**2)
+    if len(sides) == 1:
+        return found
+    only: dict[str, Any] = {
+        x: {n: p for n, p in getattr(found, x).items() if n in sizes} for x in sides
     }
-    apart = {name: x for name, x in found.difference.items() if name in theirs}
-    return replace(found, in_simulation=theirs, difference=apart)
+    return replace(found, **only)
 
 
 def _counts(found: Finding, law: EffectAt) -> bool:
@@ -221,22 +234,6 @@ def _absent(effect: EffectAt, equations: Equations, p: float, share: float) -> F
     apart = {n: replace(x, value=x.value - float(theirs[n].value)) for n, x in none.items()}  # type: ignore[operator]  # sizes are numbers
     found = _plain(effect, {**theirs, **none}, equations, p)
     return replace(found, share=share, in_simulation=theirs, difference=apart)
-
-
-def disagreement(shares: Mapping[str, float]) -> str:
-    """Return a sentence on what the nominal robot leaves of a simulation; empty if little.
-
-    Args:
-        shares: of the mean squared effort, by joint.
-    """
-    worst = max(shares, key=lambda name: shares[name])
-    if shares[worst] < LEAST_SHARE:
-        return ''
-    return (
-        'The robot file does not describe the simulation: it leaves '
-        f'{100.0 * shares[worst]:.2g} % of the mean squared effort of {worst} there unexplained. '
-        'The machine is compared with the simulation as it was recorded.'
-    )
 
 
 def none_in_simulation(found: Finding) -> Finding:

@@ -97,6 +97,20 @@ def test_what_both_have_is_as_probable_as_it_is_alike(apart, share, theirs, prob
     assert _counts(found, law) is (why is None and apart > 0.5)
 
 
+@pytest.mark.parametrize('stiffness', [0.01, 0.6])
+def test_a_law_that_the_machine_has_none_of_has_no_place_there(equations_for, heavy, stiffness):
+    """A spring of no stiffness rests nowhere; that of the simulation does."""
+    _, real = equations_for(heavy[1])
+    laws = [EffectAt(EFFECTS['spring'], Place(0), coefficients=np.array([k, k * rest]))
+            for k, rest in ((stiffness, -5.0), (0.9, 0.4))]  # fmt: skip
+    spread = {'stiffness': 0.05, 'rest': 3.0}
+    found = _sized(_compared(*laws, (spread, {}), real), laws[0], is_in_simulation=True)
+    has_place = stiffness > 0.1
+    assert ('rest' in found.parameters) is ('rest' in found.difference) is has_place
+    assert set(found.in_simulation) == {'stiffness', 'rest'}
+    assert {'stiffness'} <= set(found.parameters) & set(found.difference)
+
+
 def test_only_what_nearly_every_joint_has_may_differ_by_a_tenth():
     """A spring that is a little stiffer in the machine is another one."""
     numbers = {'stiffness': Parameter(1.0, 0.01, 'N m/rad')}
@@ -113,7 +127,7 @@ def test_a_law_that_the_simulation_is_not_known_to_have_has_no_place_there():
     }
     stop = Finding('knee', 'end_stop', numbers, Location(), 1.0, 0.9, 1.0,
                    in_simulation=numbers, difference=numbers)  # fmt: skip
-    sized = _sized(stop, EffectAt(EFFECTS['end_stop'], Place(0)))
+    sized = _sized(stop, EffectAt(EFFECTS['end_stop'], Place(0)), is_in_simulation=False)
     assert set(sized.in_simulation) == set(sized.difference) == {'stiffness'}
     assert set(sized.parameters) == {'position', 'stiffness'}
 

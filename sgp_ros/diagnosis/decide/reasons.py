@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import EVIDENCE, PER_PARAMETER
+from sgp_ros.diagnosis.criteria import EVIDENCE, LEAST_SHARE, PER_PARAMETER
 from sgp_ros.diagnosis.decide.cross_validation import physics_left
 from sgp_ros.diagnosis.decide.decision import Decision
 from sgp_ros.diagnosis.decide.scale import Scale
@@ -157,3 +157,19 @@ def left_remarks(equations: Equations, model: Model, unknown: Collection[int]) -
             f'{100.0 * share[j]:.2g} % is left that comes back with the motion. That is little '
             'beside what is named, but it may be physics that no law here describes.'
         )
+
+
+def disagreement(shares: Mapping[str, float]) -> str:
+    """Return a sentence on what the nominal robot leaves of a simulation; empty if little.
+
+    Args:
+        shares: of the mean squared effort, by joint.
+    """
+    worst = max(shares, key=lambda name: shares[name])
+    if shares[worst] < LEAST_SHARE:
+        return ''
+    return (
+        'The robot file does not describe the simulation: it leaves '
+        f'{100.0 * shares[worst]:.2g} % of the mean squared effort of {worst} there unexplained. '
+        'The machine is compared with the simulation as it was recorded.'
+    )
