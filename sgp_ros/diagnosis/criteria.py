@@ -178,5 +178,11 @@ CARRIED_ERROR = 4.0
 INTERVAL = 1.96
 """Half the width of an interval of 95 %, in standard deviations [1]. Convention."""
 
+SAME_LEVEL = 0.15
+"""Difference, over the larger one, up to which levels of friction are the same [1]. Convention.
+
+One number stands for friction that grows with the load, falls with speed and wanes as it warms up.
+"""
+
 NUMBER_ERROR = 0.003
 """Relative standard deviation that approximations of the signals add to numbers [1]. Practice."""

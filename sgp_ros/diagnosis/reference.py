@@ -27,6 +27,7 @@ from sgp_ros.diagnosis.criteria import (
     INTERVAL,
     MOST_CERTAIN,
     PER_EFFECT,
+    SAME_LEVEL,
     TEMPER,
 )
 from sgp_ros.diagnosis.decide.differences import Several
@@ -36,12 +37,6 @@ from sgp_ros.diagnosis.wrong_bodies import parameter_errors, traded_remarks
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.place import Place, joint_name
-
-ALIKE = 0.15
-"""Difference, over the larger one, up to which levels of friction are alike [1]. Convention.
-
-One number stands for friction that grows with the load, falls with speed and wanes as it warms up.
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,11 +193,11 @@ def _counts(found: Finding, law: EffectAt) -> bool:
 
 
 def _is_alike(found: Finding, law: EffectAt) -> bool:
-    """Return whether the sizes of a law that nearly every joint has are `ALIKE`."""
-    numbers = ((float(found.parameters[n].value), float(x.value))
-               for n, x in found.difference.items())  # fmt: skip
-    return law.effect.is_usual and all(
-        abs(apart) < ALIKE * max(abs(ours), abs(ours - apart)) for ours, apart in numbers
+    """Return whether the sizes of a law that nearly every joint has are the same."""
+    numbers = [(float(found.parameters[n].value), float(x.value))
+               for n, x in found.difference.items()]  # fmt: skip
+    return bool(law.effect.is_usual and numbers) and all(
+        abs(apart) < SAME_LEVEL * max(abs(ours), abs(ours - apart)) for ours, apart in numbers
     )
 
 

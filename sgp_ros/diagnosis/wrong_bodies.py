@@ -206,7 +206,8 @@ def _apart(model: Model, other: Model) -> tuple[np.ndarray, np.ndarray]:
     equations, C = model.frame.equations, _of_bodies(model) + _of_bodies(other)
     at, frames = equations.instants, (model.frame, other.frame)
     usual = sum(f.weight * np.linalg.inv(f.R.T @ f.R)[-len(C) :, -len(C) :] for f in frames)
-    root = np.linalg.cholesky(np.linalg.inv(usual)).T
+    values, vectors = np.linalg.eigh(usual)
+    root = (vectors / np.sqrt(np.maximum(values, 1e-14 * values[-1]))).T
     alone = _one_body(equations, root, (model.w - other.w)[at:], prior=2.0)
     if alone is None:
         return model.w, C
