@@ -13,6 +13,7 @@ from sgp_proof.concealed.unlisted import SAME
 ROOT = Path(__file__).parents[1]
 TARGET = Path(__file__).parent / 'unlisted.md'
 RESULTS = ROOT / 'sgp_proof/results/unlisted_ninth.json'
+NINTH_AGAIN = ROOT / 'sgp_proof/results/unlisted_ninth_again.json'
 EIGHTH = ROOT / 'sgp_proof/results/unlisted_eighth.json'
 EIGHTH_AGAIN = ROOT / 'sgp_proof/results/unlisted_eighth_again.json'
 SEVENTH = ROOT / 'sgp_proof/results/unlisted_seventh.json'
@@ -42,7 +43,7 @@ def text():
     earlier = {'first': FIRST, 'third': THIRD, 'again': AGAIN, 'fourth': FOURTH,
                'fourth_again': FOURTH_AGAIN, 'fifth': FIFTH, 'fifth_again': FIFTH_AGAIN,
                'sixth': SIXTH, 'sixth_again': SIXTH_AGAIN, 'seventh': SEVENTH, 'eighth': EIGHTH,
-               'eighth_again': EIGHTH_AGAIN}  # fmt: skip
+               'eighth_again': EIGHTH_AGAIN, 'ninth_again': NINTH_AGAIN}  # fmt: skip
     known = {f'{name}_{key}': value for name, path in earlier.items()
              for key, value in _rates(path).items()}  # fmt: skip
     numbers = sorted(int(r['case'].rpartition('_')[2]) for r in rows)
