@@ -5,10 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.candidates import fit
+from sgp_ros.diagnosis.explain.comparison import compare_models
 from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.diagnosis.unlisted import formulas
 from sgp_ros.diagnosis.unlisted.beside import law_of
 from sgp_ros.diagnosis.unlisted.formulas import Range, law
+from sgp_ros.diagnosis.unlisted.search import search
 from sgp_ros.diagnosis.unlisted.shapes import PIECES, SmoothForce
 from sgp_ros.diagnosis.unlisted.shorter import idle, shorter, without
 from sgp_ros.diagnosis.unlisted.variables import Variable
@@ -31,9 +35,8 @@ def test_a_text_loses_the_terms_of_some_coefficients(text, names, short):
     assert without(text, names) == short
 
 
-@pytest.mark.parametrize('offset', [0.0, 0.4])
-def test_a_formula_loses_a_constant_that_is_hardly_there(equations_for, offset):
-    """Of a Maxwell element: a speed after a lag, which a second one with a place could imitate."""
+def _seal(offset):
+    """Return the force of a Maxwell element: it follows a speed after a lag."""
     state = [0.0, 0.0]
 
     def force(t, _q, v):
@@ -41,7 +44,23 @@ def test_a_formula_loses_a_constant_that_is_hardly_there(equations_for, offset):
         state[0] = t
         return (-0.8 * state[1] + offset,)
 
-    _, equations = equations_for(simulate(CHAINS[1], 11, 10.0, force=force))
+    return simulate(CHAINS[1], 11, 10.0, force=force)
+
+
+def test_a_search_ends_with_a_formula_without_idle_terms(equations_for, monkeypatch):
+    """And not with a longer one that no term can leave, for they only fit together."""
+    monkeypatch.setattr(formulas, 'texts', lambda _: ['a*X + d', 'a*abs(X - x0) + d'])
+    _, equations = equations_for(_seal(0.0))
+    comparison = compare_models(equations, lambda _share: None)
+    scale = Scale.of(equations, comparison)
+    found = search(Columns(equations), scale, fitted(equations), 0, is_open=True)
+    assert law_of(found.laws[0], 0).effect.text == 'a*X'
+
+
+@pytest.mark.parametrize('offset', [0.0, 0.4])
+def test_a_formula_loses_a_constant_that_is_hardly_there(equations_for, offset):
+    """Of a Maxwell element, which a term with a place could imitate."""
+    _, equations = equations_for(_seal(offset))
     motion, columns = equations.motion, Columns(equations)
     variable = Variable('dq', 0, 'joint0', memory=('lag', 0.25))
     smooth = SmoothForce(0, variable, '', variable.knots(motion, PIECES), 'joint0')
