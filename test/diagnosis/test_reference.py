@@ -57,6 +57,29 @@ def test_bodies_are_compared_with_those_of_the_simulation(equations_for, heavy, 
     assert found.findings == ()
 
 
+@pytest.mark.parametrize('is_same', [True, False])
+def test_bodies_that_no_number_places_are_told_in_words(
+    equations_for, heavy, perfect, monkeypatch, is_same
+):
+    """Where bodies differ from those of the simulation, and there alone."""
+    (_, real), (_, sim) = (equations_for(x[1]) for x in (heavy, heavy if is_same else perfect))
+    monkeypatch.setattr(reference, 'traded_remarks', lambda *_: iter(['told']))
+    ours, theirs = (decide_several(x, 1, lambda _share: None, lambda _: real) for x in (real, sim))
+    assert against_simulation(real, ours, sim, theirs).remarks == (() if is_same else ('told',))
+
+
+def test_remarks_of_the_comparison_are_those_of_the_diagnosis(robots, dry, viscous, monkeypatch):
+    robot, tree = robots[1]
+    compared = pipeline.against_simulation
+
+    def remarked(*given):
+        return replace(compared(*given), remarks=('told',))
+
+    monkeypatch.setattr(pipeline, 'against_simulation', remarked)
+    found = pipeline.diagnose(events_of(dry), robot, tree, {}, simulation=events_of(viscous))
+    assert 'told' in found.remarks
+
+
 @pytest.mark.parametrize('refuses', [False, True])
 def test_laws_that_are_refused_do_not_differ_from_a_simulation(
     robots, dry, viscous, monkeypatch, refuses

@@ -36,7 +36,7 @@ def idle(columns: Columns, model: Model, joint: int) -> frozenset[str]:
 
 
 def shorter(columns: Columns, model: Model, joint: int) -> Iterator[Model]:
-    """Yield models with a shorter formula, the terms of which are not idle; see `idle`.
+    """Yield the model with a shorter formula, without idle terms, if there is one; see `idle`.
 
     Args:
         columns: of the recording.
@@ -60,7 +60,6 @@ def shorter(columns: Columns, model: Model, joint: int) -> Iterator[Model]:
                 steps=10, still=len(far))  # fmt: skip
     if short.is_possible() and np.isfinite(short.score):
         yield short
-        yield from shorter(columns, short, joint)
 
 
 def without(text: str, names: Collection[str]) -> str:
