@@ -349,6 +349,13 @@ def test_imports_are_plain(path):
 
 
 @each([*MODULES, *PROOF_MODULES])
+def test_no_function_takes_the_name_of_another(path):
+    """The first one of a module would be lost."""
+    names = [x.name for x in _tree(path).body if isinstance(x, (ast.FunctionDef, ast.ClassDef))]
+    assert len(names) == len(set(names)), names
+
+
+@each([*MODULES, *PROOF_MODULES])
 def test_every_module_says_what_it_is_for(path):
     """The docstring's first line is one sentence."""
     docstring = ast.get_docstring(_tree(path))

@@ -78,7 +78,7 @@ def _attempt(seed, rng, sealed, answer_file):
         transport = draw_transport(rng, 'B')
         write_simulated(shown, sealed / f'{name}.mcap', transport, seed=seed, command_topic=TOPIC)
     answer = {
-        'robot': world.family, 'kind': kind, 'differs': [_difference(*d) for d in differs],
+        'robot': world.family, 'kind': kind, 'differs': [_drawn(*d) for d in differs],
         'shared': [[e.at.name, e.at.joint] for e in both[len(differs) if kind == SIZE else 0 :]],
     }  # fmt: skip
     answer_file.write_text(json.dumps(answer, indent=1) + '\n', encoding='utf-8')
@@ -90,7 +90,7 @@ def _sized(rng, world, motion, names):
     return effect
 
 
-def _difference(machine, simulation):
+def _drawn(machine, simulation):
     """Return effect, joint, and by how much its size is greater on the machine."""
     at = (machine or simulation).at
     name, sides = _SIZES[at.name], ((machine, 1.0), (simulation, -1.0))
