@@ -39,6 +39,7 @@ class Columns:
         self._known: dict[tuple[object, ...], Seen] = {}
         self._edges: dict[tuple[object, ...], np.ndarray | None] = {}
         self._motions: dict[bytes, ObservedMotion] = {}
+        self._alike: dict[tuple[bytes, float], bytes | None] = {}
         self._held = 0
         self.settled = set[object]()
 
@@ -73,12 +74,14 @@ class Columns:
             w: (p,) change of the bodies; None for none.
             within: difference that these may make, see `BodyChange`.
         """
-        motion = self._equations[frozenset()].motion
-        if w is None or self._body_change.largest(w) <= within:
-            return motion
-        near = (k for k in self._motions
-                if self._body_change.largest(np.frombuffer(k) - w) <= within)  # fmt: skip
-        key = next(near, w.tobytes())
+        if w is None:
+            return self._equations[frozenset()].motion
+        asked = w.tobytes(), within
+        if asked not in self._alike:
+            self._alike[asked] = self._near(w, within)
+        key = self._alike[asked]
+        if key is None:
+            return self._equations[frozenset()].motion
         if key not in self._motions:
             others, too_many = self._motions.values(), len(self._motions) > 20
             if too_many or sum(o.remembered for o in others) > MOST_SLOPES:
@@ -86,8 +89,18 @@ class Columns:
                     other.forget()
             if too_many:
                 self._motions.clear()
+                self._alike = {asked: key}
+            motion = self._equations[frozenset()].motion
             self._motions[key] = self._equations[frozenset()].with_bodies(motion, w)
         return self._motions[key]
+
+    def _near(self, w: np.ndarray, within: float) -> bytes | None:
+        """Return the key of bodies that differ so little, or its own; None for the file's."""
+        if self._body_change.largest(w) <= within:
+            return None
+        near = (k for k in self._motions
+                if self._body_change.largest(np.frombuffer(k) - w) <= within)  # fmt: skip
+        return next(near, w.tobytes())
 
     @cached_property
     def _body_change(self) -> BodyChange:
