@@ -91,8 +91,9 @@ def traded_remarks(
     if other is None:
         changes = [(m.w, _of_bodies(m)) for m in (model, _with_offsets(equations, model))]
     else:
-        changes = [(model.w, _of_bodies(model) + _of_bodies(other))] * 2
-    alone, beside = (_numbers(equations, *change, stated, unstated) for change in changes)
+        changes = [(model.w, _of_bodies(model) + _of_bodies(other))]
+    found = [_numbers(equations, *change, stated, unstated) for change in changes]
+    alone, beside = found[0], found[-1]
     numbers, (x, C, _), plain = alone[0], _in_units(*beside), _in_units(*alone)
     held = [i for i, e in enumerate(numbers) if (e.link, e.parameter) not in told]
     asked = max(EVIDENCE, STRUCTURE_LEAST_SHARE * _cost(x, C, [*range(len(x))]))
