@@ -74,14 +74,15 @@ class Columns:
             w: (p,) change of the bodies; None for none.
             within: difference that these may make, see `BodyChange`.
         """
+        whole = self._equations[frozenset()]
         if w is None:
-            return self._equations[frozenset()].motion
+            return whole.motion
         asked = w.tobytes(), within
         if asked not in self._alike:
             self._alike[asked] = self._near(w, within)
         key = self._alike[asked]
         if key is None:
-            return self._equations[frozenset()].motion
+            return whole.motion
         if key not in self._motions:
             others, too_many = self._motions.values(), len(self._motions) > 20
             if too_many or sum(o.remembered for o in others) > MOST_SLOPES:
@@ -90,8 +91,7 @@ class Columns:
             if too_many:
                 self._motions.clear()
                 self._alike = {asked: key}
-            motion = self._equations[frozenset()].motion
-            self._motions[key] = self._equations[frozenset()].with_bodies(motion, w)
+            self._motions[key] = whole.with_bodies(whole.motion, w)
         return self._motions[key]
 
     def _near(self, w: np.ndarray, within: float) -> bytes | None:
