@@ -6,12 +6,11 @@ deviation each. What they do to a joint is factored once, for every scale of its
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 
-from sgp_ros.rigid.rigid_body import mass_matrix
 from sgp_ros.rigid.tree import Tree
 
 SPREAD = 0.25
@@ -51,54 +50,6 @@ class Factor:
         R = np.zeros((len(own), base.shape[1]))
         R[:, seen] = own
         return cls(Q, R)
-
-
-@dataclass(frozen=True, eq=False)
-class BodyChange:
-    """Changes of the efforts of a motion, and of the inertia at its joints, with the bodies.
-
-    Attributes:
-        efforts: of each joint that moves, (r, p) whose square is that of its efforts, relative to
-            their mean square.
-        inertia: at some joints and poses, (m, p), relative to the nominal one.
-    """
-
-    efforts: tuple[np.ndarray, ...]
-    inertia: np.ndarray
-
-    @classmethod
-    def of(
-        cls, factors: Sequence[Factor], power: np.ndarray, rows: int, tree: Tree,
-        directions: np.ndarray, poses: np.ndarray,
-    ) -> BodyChange:  # fmt: skip
-        """Return that of a recording.
-
-        Args:
-            factors: of each joint.
-            power: (k,) mean squared effort [N^2 m^2 or N^2].
-            rows: number of equations.
-            tree: nominal robot.
-            directions: (p, 10 b) of `body_directions`, the last columns of the factors.
-            poses: (m, k) some positions [rad or m].
-        """
-        others = factors[0].R.shape[1] - len(directions)
-        efforts = tuple(
-            factor.R[:, others:] / np.sqrt(rows * square)
-            for factor, square in zip(factors, power, strict=True) if square > 0.0
-        )  # fmt: skip
-        tables = tree.parameters.ravel(), *directions
-        nominal, *found = (
-            np.einsum('njj->nj', mass_matrix(tree, table, poses)).ravel() for table in tables
-        )
-        inertia = np.array(found).reshape(-1, len(nominal)).T
-        size = np.maximum(nominal, np.linalg.norm(inertia, axis=1))[:, None]
-        return cls(efforts, inertia / np.maximum(size, 1e-300))
-
-    def largest(self, change: np.ndarray) -> float:
-        """Return by how much efforts, in root mean square, or an inertia change with w (p,)."""
-        w = change[len(change) - self.inertia.shape[1] :]
-        efforts = [float(np.linalg.norm(part @ w)) for part in self.efforts]
-        return max([*efforts, float(np.abs(self.inertia @ w).max())])
 
 
 def body_directions(

@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 
-from sgp_ros.diagnosis.compare.bodies import BodyChange
 from sgp_ros.diagnosis.compare.equations import Equations
 from sgp_ros.diagnosis.compare.sample import sampled
 from sgp_ros.diagnosis.explain.inertia_slope import InertiaSlope
@@ -17,12 +16,8 @@ from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.place import Place
 from sgp_ros.robots.observed_motion import ObservedMotion
 
-MOST_HELD = 160_000_000
-"""Bytes that are remembered before the first ones are forgotten: all laws at all joints of an arm
-take hardly more, on as many rows as are looked at."""
-SAME = 1e-3
-"""Change of efforts and inertia up to which bodies are the same to the laws that depend on them:
-what these add is small beside the efforts."""
+MOST_HELD = 15_000_000
+"""Numbers that are remembered before the first ones are forgotten: 120 MB."""
 MOST_SLOPES = 15_000_000
 """Slopes of efforts that motions of changed bodies hold before they let go of them: 120 MB."""
 
@@ -39,7 +34,6 @@ class Columns:
         self._known: dict[tuple[object, ...], Seen] = {}
         self._edges: dict[tuple[object, ...], np.ndarray | None] = {}
         self._motions: dict[bytes, ObservedMotion] = {}
-        self._alike: dict[tuple[bytes, float], bytes | None] = {}
         self._held = 0
         self.settled = set[object]()
 
@@ -67,22 +61,20 @@ class Columns:
         found = InertiaSlope(self._equations[frozenset()])
         return found if found.joints.size else None
 
-    def corrected(self, w: np.ndarray | None, within: float = SAME) -> ObservedMotion:
+    def corrected(self, w: np.ndarray | None, within: float = 0.0) -> ObservedMotion:
         """Return the motion of a robot with changed bodies, or with others that differ so little.
 
         Args:
             w: (p,) change of the bodies; None for none.
-            within: difference that these may make, see `BodyChange`.
+            within: difference that may be [standard deviations of the prior].
         """
-        whole = self._equations[frozenset()]
-        if w is None:
-            return whole.motion
-        asked = w.tobytes(), within
-        if asked not in self._alike:
-            self._alike[asked] = self._near(w, within)
-        key = self._alike[asked]
-        if key is None:
-            return whole.motion
+        motion = self._equations[frozenset()].motion
+        if w is None or not w.any():
+            return motion
+        key = w.tobytes()
+        if within > 0.0:
+            near = (k for k in self._motions if np.abs(np.frombuffer(k) - w).max() <= within)
+            key = next(near, key)
         if key not in self._motions:
             others, too_many = self._motions.values(), len(self._motions) > 20
             if too_many or sum(o.remembered for o in others) > MOST_SLOPES:
@@ -90,25 +82,8 @@ class Columns:
                     other.forget()
             if too_many:
                 self._motions.clear()
-                self._alike = {asked: key}
-            self._motions[key] = whole.with_bodies(whole.motion, w)
+            self._motions[key] = self._equations[frozenset()].with_bodies(motion, w)
         return self._motions[key]
-
-    def _near(self, w: np.ndarray, within: float) -> bytes | None:
-        """Return the key of bodies that differ so little, or its own; None for the file's."""
-        if self._body_change.largest(w) <= within:
-            return None
-        near = (k for k in self._motions
-                if self._body_change.largest(np.frombuffer(k) - w) <= within)  # fmt: skip
-        return next(near, w.tobytes())
-
-    @cached_property
-    def _body_change(self) -> BodyChange:
-        whole = self._equations[frozenset()]
-        tree, poses = whole.motion.tree, whole.poses[0].position
-        return BodyChange.of(
-            whole.factors, whole.power, len(whole.d), tree, whole.directions, poses
-        )
 
     def of(
         self, candidate: EffectAt, equations: Equations, w: np.ndarray | None = None
@@ -188,9 +163,9 @@ class Columns:
         raw = make()
         x = equations.compact(raw, joint, is_inertial=is_inertial)
         found = Seen(equations, x, joint, count)
-        self._held += found.x.nbytes
+        self._held += found.x.size
         while self._held > MOST_HELD and self._known:
-            self._held -= self._known.pop(next(iter(self._known))).x.nbytes
+            self._held -= self._known.pop(next(iter(self._known))).x.size
         self._known[keys[raw.ndim == 3]] = found
         return found
 

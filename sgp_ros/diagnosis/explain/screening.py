@@ -21,7 +21,7 @@ from sgp_ros.robots.observed_motion import ObservedMotion
 TRIALS = 2
 """Shapes per effect and place that are worth a fit."""
 _NEAR = 0.05
-"""Change of efforts and inertia with the bodies up to which columns are not made anew [1]."""
+"""Change of the bodies with which columns need not be made anew [standard deviations]."""
 _DEPENDENT = 1e-6
 """Ratio of singular values from which columns are linearly dependent [1]."""
 WIDEST = 0.75

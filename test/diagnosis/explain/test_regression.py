@@ -218,29 +218,6 @@ def test_slopes_of_efforts_are_their_derivatives(equations_for, heavy):
     np.testing.assert_allclose(by_a, M[:, :, 1], atol=1e-9 * scale)
 
 
-@pytest.mark.parametrize('within', [1e-3, 0.05])
-def test_bodies_that_change_efforts_and_inertia_little_share_a_motion(
-    equations_for, heavy, within
-):
-    """By the root mean square of the efforts of each joint, and by the inertia at each joint."""
-    _, equations = equations_for(heavy[2])
-    columns, rng = Columns(equations), np.random.default_rng(6)
-    tree, q = equations.motion.tree, equations.poses[0].position
-    nominal = mass_matrix(tree, tree.parameters, q)
-    spread = [mass_matrix(tree, x, q) for x in equations.directions]
-    least = np.sqrt(sum(M**2 for M in spread))
-    for _ in range(20):
-        w = rng.normal(size=equations.size) * 10.0 ** rng.uniform(-5.0, 0.0)
-        force = np.sqrt((equations.force_of_bodies(w) ** 2).mean(axis=0) / equations.power)
-        M = mass_matrix(tree, w[equations.instants :] @ equations.directions, q)
-        inertia = np.abs(M / np.maximum(nominal, least))
-        is_near = force.max() <= within and np.einsum('njj->nj', inertia).max() <= within
-        assert (columns.corrected(w, within) is equations.motion) == is_near
-        there = columns.corrected(3.0 * w, within)
-        w[: equations.instants] += 1.0  # the instants of efforts are no bodies
-        assert columns.corrected(3.0 * w, within) is there
-
-
 def test_a_motor_that_delivers_half_is_as_exact_where_its_joint_is_held(equations_for, perfect):
     """With half the inertia it leaves half of all forces, and predicts the same motion."""
     equations = equations_for(perfect[1])[1]
