@@ -29,6 +29,16 @@ class NamedPoint(Protocol):
         """Origin in the frame of the body's joint, (3,) [m]."""
 
 
+class CarriedLink(Protocol):
+    """A link while the robot moves; all directions are along the axes of the root."""
+
+    def points(self, at: np.ndarray) -> np.ndarray:
+        """Return where a point (3,) of the link is, (n, 3) [m]."""
+
+    def columns(self, at: np.ndarray) -> np.ndarray:
+        """Return the efforts of a unit force along each axis on a point, (n, k, 3)."""
+
+
 class Structure(Protocol):
     """Joints and nominal bodies of a robot, of which the first k move on their own."""
 
@@ -83,6 +93,14 @@ class Structure(Protocol):
     @property
     def frames(self) -> Sequence[NamedPoint]:
         """All links by name."""
+
+    @property
+    def tool(self) -> NamedPoint | None:
+        """Moving link called `tool0`."""
+
+    @property
+    def tool_body(self) -> int:
+        """Body that carries the tool; -1 where several could."""
 
 
 class Commands(Protocol):
@@ -203,6 +221,10 @@ class SeenMotion(Protocol):
     @property
     def tool_columns(self) -> np.ndarray:
         """Efforts of a unit force along the root axes at `tool0`, (n, k, 3); else (n, k, 0)."""
+
+    @property
+    def tool(self) -> CarriedLink | None:
+        """Motion of the link that carries the tool; None where several are outermost."""
 
     @property
     def load_columns(self) -> Mapping[int, np.ndarray]:

@@ -146,6 +146,18 @@ class Tree:
         ends = tuple(i for i in range(self.size) if i not in inner)
         return tuple(i for i in tools if i >= 0) or ends
 
+    @property
+    def tool(self) -> Frame | None:
+        """Moving link called `tool0`."""
+        return next((f for f in self.frames if f.name == 'tool0' and f.body >= 0), None)
+
+    @property
+    def tool_body(self) -> int:
+        """Body that carries the tool: of `tool0`, else the only outermost one; -1 for none."""
+        if self.tool is not None:
+            return self.tool.body
+        return self.outermost[0] if len(self.outermost) == 1 else -1
+
     def _leader(self, body: int) -> int:
         """Return a body, or the nearest one inward whose joint moves on its own; -1 for none."""
         while body >= self.size:

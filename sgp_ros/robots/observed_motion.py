@@ -17,6 +17,7 @@ from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.motion import Commands, RecordedCommands
 from sgp_ros.physics.servo import Servo
+from sgp_ros.rigid.kinematics import LinkMotion
 from sgp_ros.rigid.rigid_body import inverse_dynamics, mass_matrix, torque_regressor
 from sgp_ros.rigid.tree import Tree
 
@@ -181,26 +182,24 @@ class ObservedMotion:
     @cached_property
     def gravity_columns(self) -> np.ndarray:
         """Efforts that hold the robot against a unit of gravity along each root axis (n, k, 3)."""
-        return self._held(self.tree.parameters)
+        q, still, held = self.position, np.zeros_like(self.position), self.tree.parameters
+        return np.stack(
+            [inverse_dynamics(self.tree, held, q, still, still, axis) for axis in np.eye(3)],
+            axis=2,
+        )
 
     @cached_property
     def tool_columns(self) -> np.ndarray:
         """Efforts of a unit force along the root axes at `tool0`, (n, k, 3); else (n, k, 0)."""
-        n, k = self.position.shape
-        frame = next((f for f in self.tree.frames if f.name == 'tool0' and f.body >= 0), None)
-        if frame is None:
-            return np.zeros((n, k, 0))
-        mass = np.zeros_like(self.tree.parameters)
-        mass[frame.body, 0] = 1.0
-        mass[frame.body, 1:4] = frame.translation
-        return -self._held(mass)
+        if self.tool is None or self.tree.tool is None:
+            return np.zeros((*self.position.shape, 0))
+        return self.tool.columns(self.tree.tool.translation)
 
-    def _held(self, parameters: np.ndarray) -> np.ndarray:
-        q, still = self.position, np.zeros_like(self.position)
-        return np.stack(
-            [inverse_dynamics(self.tree, parameters, q, still, still, axis) for axis in np.eye(3)],
-            axis=2,
-        )
+    @cached_property
+    def tool(self) -> LinkMotion | None:
+        """Motion of the link that carries the tool; None where several are outermost."""
+        body = self.tree.tool_body
+        return None if body < 0 else LinkMotion.of(self.tree, self.position, body)
 
     @cached_property
     def _slopes(self) -> dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]]:
