@@ -10,6 +10,7 @@ from pathlib import Path
 from sgp_ros.physics.catalogue import EFFECTS
 from sgp_ros.physics.grammar import FUNCTIONS
 from sgp_ros.physics.place import LAST
+from sgp_ros.physics.tool_law import PATHS
 
 TARGET = Path(__file__).parent / 'effects.md'
 PICTURES = Path(__file__).parent / 'images' / 'effects'
@@ -53,6 +54,28 @@ effects:
   values, for replay, node and simulation.
 - Laws that depend on time, have memory, or combine an effort with a position do not run online. `ddq`, which is the effect `armature`, and
   `delay` cannot be simulated. A law with `sign(dq[J])` that opposes its own motion holds the joint at rest, as dry friction does.
+
+A force on the tool acts on all joints by its lever arms. State along which path it acts:
+
+```yaml
+effects:
+  - law:
+      joint: tool
+      words: the rope of a balancer
+      formula: F_distance[tool] = -(a + b*s)
+      parameters:
+        a: {{start: 10.0, unit: N, range: [0, 200]}}
+        b: {{start: 5.0, unit: N/m, range: [-100, 100]}}
+        px: {{value: 0.7, unit: m}}
+        py: {{value: 0.35, unit: m}}
+        pz: {{value: 2.3, unit: m}}
+```
+
+- The path is {paths}. `s` is the way along it: a coordinate in the axes of the base, or the distance from the point `px`, `py`, `pz` in
+  these axes. `ds` is its rate. Along the motion there is `ds` alone, the speed: `F_motion[tool] = -c*ds**2`. A positive force acts
+  towards a greater `s`.
+- The force acts on `tool0`, or on the point `ax`, `ay`, `az` in the frame of the link that carries the tool. `sgp diagnose` looks for such laws
+  without being asked, see [unlisted.md](unlisted.md#how-the-search-works).
 """
 _OVER = {
     'seconds': 'a few seconds of time', 'time': 'time, its magnitude',
@@ -62,7 +85,8 @@ _OVER = {
 def text() -> str:
     """Return the page."""
     functions = ', '.join(f'`{name}`' for name in FUNCTIONS)
-    parts = [_HEAD.format(count=len(EFFECTS), functions=functions)]
+    paths = ', '.join(f'`{name}`' for name in PATHS[:-1]) + f' or `{PATHS[-1]}`'
+    parts = [_HEAD.format(count=len(EFFECTS), functions=functions, paths=paths)]
     parts += [_section(law) for law in EFFECTS.values()]
     return '\n'.join(parts)
 

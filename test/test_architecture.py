@@ -40,7 +40,8 @@ LAYERS = {
     },
     'simulation': NUMERIC | {
         'mujoco', 'physics.catalogue', 'physics.effect', 'physics.effect_at', 'physics.example',
-        'physics.parts', 'physics.place', 'physics.law', 'physics.grammar', 'rigid', 'optional',
+        'physics.parts', 'physics.place', 'physics.law', 'physics.grammar', 'physics.formula',
+        'physics.tool_law', 'rigid', 'optional',
         'errors',
     },
     'engine': {'numpy', 'numba', 'gp', 'physics', 'rigid', 'robots', 'errors'},

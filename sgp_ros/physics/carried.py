@@ -114,7 +114,7 @@ class Payload(Effect):
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
         """Return what the efforts could carry at the centre of the link, and how far it may be."""
-        reach, body = _reach(motion, place.joint), motion.tree.parameters[place.joint]
+        reach, body = link_reach(motion, place.joint), motion.tree.parameters[place.joint]
         unit = self.added_body(np.array([1.0, *(body[1:4] / max(float(body[0]), 1e-9))]))
         efforts = np.hypot(motion.effort, motion.nominal_effort)
         of_unit = motion.load_columns[place.joint] @ unit
@@ -138,7 +138,7 @@ class Payload(Effect):
         )  # fmt: skip
 
 
-def _reach(motion: SeenMotion, joint: int) -> float:
+def link_reach(motion: SeenMotion, joint: int) -> float:
     """Return how far from its joint a load may sit on a link [m]."""
     tree = motion.tree
     values = tree.parameters[joint]

@@ -10,16 +10,16 @@ the built-in laws. `lag`, `play` and `delay` run over the grid of a recording.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 
-from sgp_ros.physics.effect import Effect, Numbers
+from sgp_ros.physics.effect import Effect
 from sgp_ros.physics.formula import Formula, read_formula
 from sgp_ros.physics.grammar import MEMORY, TIME
-from sgp_ros.physics.motion import SeenMotion, Structure
+from sgp_ros.physics.motion import SeenMotion
 from sgp_ros.physics.parts import LawParameter, Quantity, Value, relative_scales
 from sgp_ros.physics.place import Place, Placed
 from sgp_ros.physics.term import Motion
@@ -38,7 +38,7 @@ class _Seen:
     """Where a formula is evaluated: a motion, and the parameters by name."""
 
     motion: SeenMotion
-    numbers: Numbers
+    numbers: Mapping[str, float | np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,8 @@ class FormulaLaw(Effect):
         self.quantities = tuple(parameters)
         self.known = {p.name: p.start for p in parameters if p.is_known}
         self._own = {p.name: p for p in parameters}
-        self.linear = formula.linear([n for n in self._own if n not in self.known])
+        sought = formula.parameters - {*self.known}
+        self.linear = formula.linear([n for n in self._own if n in sought])
         kinds = {kind for kind, _ in formula.signals}
         self.has_memory = bool(formula.functions & set(MEMORY))
         self.sees_acceleration = 'ddq' in kinds
@@ -104,10 +105,6 @@ class FormulaLaw(Effect):
         of_effort = any(kind == 'tau' for kind, _ in self.law.signals)
         return tuple(range(max(len(self.linear), 1))) if of_effort else ()
 
-    def stated_words(self, place: Place, tree: Structure) -> dict[str, str]:
-        """Return nothing: a law comes in no variants."""
-        return {}
-
     def surprise(self, at: Placed) -> float:
         """Return what the choice of its formula takes [nats]."""
         return self._price
@@ -129,17 +126,19 @@ class FormulaLaw(Effect):
         return [Place(j)] if j in motion.moving_joints else []
 
     def starts(self, motion: SeenMotion, place: Place) -> np.ndarray:
-        """Return the stated starts, and places between the ends of their ranges.
+        """Return the stated starts, and places between the ends of their ranges."""
+        grid = [self.values_of(name) for name in self.shape_names()]
+        return np.array(list(itertools.product(*grid)), dtype=np.float64)
+
+    def values_of(self, name: str) -> list[float]:
+        """Return the start of a number and values in its range.
 
         Even ones, or even ratios where the range has one sign.
         """
-        grid = []
-        for name in self.shape_names():
-            p = self._own[name]
-            low, high = p.ends
-            even = np.geomspace if low > 0.0 else np.linspace
-            grid.append([p.start, *even(low, high, 2 + _BETWEEN)[1:-1]])
-        return np.array(list(itertools.product(*grid)), dtype=np.float64)
+        p = self._own[name]
+        low, high = p.ends
+        even = np.geomspace if low > 0.0 else np.linspace
+        return [p.start, *even(low, high, 2 + _BETWEEN)[1:-1].tolist()]
 
     def bounds(self, motion: SeenMotion, place: Place) -> tuple[np.ndarray, np.ndarray]:
         ends = np.array([self._own[name].ends for name in self.shape_names()]).reshape(-1, 2)
@@ -151,15 +150,23 @@ class FormulaLaw(Effect):
         return np.where(low >= 0.0, relative_scales(low, high, np.abs(shape)), high - low)
 
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
-        """Return the force per factor, (n, m); the whole force without factors."""
-        numbers = self.known | dict(zip(self.shape_names(), shape.tolist(), strict=True))
+        return self.per_factor(motion, self.shape_numbers(shape))
+
+    def shape_numbers(self, shape: np.ndarray) -> dict[str, float]:
+        """Return all parameters that are no factors, by name."""
+        return self.known | dict(zip(self.shape_names(), shape.tolist(), strict=True))
+
+    def per_factor(
+        self, motion: SeenMotion, numbers: Mapping[str, float | np.ndarray]
+    ) -> np.ndarray:
+        """Return the formula per factor, (n, m), the whole without, of numbers or rows (n,)."""
         names = motion.tree.moving_names
         force, n = self._compiled(names, _sign), len(motion.position)
         found = []
         for chosen in self.linear or ('',):
             ones = {name: float(name == chosen) for name in self.linear}
             with np.errstate(all='ignore'):
-                x = force(_Seen(motion, numbers | ones))
+                x = force(_Seen(motion, {**numbers, **ones}))
             found.append(np.broadcast_to(np.asarray(x, dtype=np.float64), (n,)))
         x = np.nan_to_num(np.column_stack(found), nan=0.0, posinf=0.0, neginf=0.0)
         return np.clip(x, -_GREATEST, _GREATEST)

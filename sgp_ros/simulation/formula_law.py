@@ -16,8 +16,11 @@ from sgp_ros.errors import ConfigError
 from sgp_ros.physics.grammar import MEMORY, TIME
 from sgp_ros.physics.law import FormulaLaw
 from sgp_ros.physics.parts import Value
+from sgp_ros.physics.tool_law import ToolLaw
 from sgp_ros.simulation.effects import Action, EffectParameter, Law, Moment
 from sgp_ros.simulation.mechanism import SimulatedJoint
+from sgp_ros.simulation.tool_pull import ToolPull
+from sgp_ros.simulation.tree import pulled
 
 _STIFF_S = 1e-3
 """Time constant with which the output of a play follows its edges [s]."""
@@ -41,6 +44,12 @@ def formula_law(law: FormulaLaw) -> Law:
     Raises:
         ConfigError: one that depends on accelerations or on delayed signals.
     """
+    own = tuple(
+        EffectParameter(q.name, q.unit, q.low, default=law.known.get(q.name))
+        for q in law.quantities
+    )
+    if isinstance(law, ToolLaw):
+        return Law(changed=lambda tree, values: pulled(tree, ToolPull.of(law, values)), own=own)
     if law.sees_acceleration or 'delay' in law.law.functions:
         raise ConfigError(
             f'the law {law.formula!r} of an acceleration or a delay cannot be simulated',
@@ -48,11 +57,7 @@ def formula_law(law: FormulaLaw) -> Law:
             'use the effect armature for an inertia, command_delay for a delayed command',
         )
     return Law(
-        lambda joints, joint, values: (_Built(law, joints, joint, values).action(),),
-        own=tuple(
-            EffectParameter(q.name, q.unit, q.low, default=law.known.get(q.name))
-            for q in law.quantities
-        ),
+        lambda joints, joint, values: (_Built(law, joints, joint, values).action(),), own=own
     )
 
 

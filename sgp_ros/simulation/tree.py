@@ -21,6 +21,7 @@ from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.parts import Value
 from sgp_ros.simulation.mechanism import Mechanism, TrueCoefficient, quantity
 from sgp_ros.simulation.mount import MOUNT, Mount
+from sgp_ros.simulation.tool_pull import ToolPull
 from sgp_ros.simulation.tree_text import TreePart, TreeText, read_tree
 from sgp_ros.simulation.tree_xml import plain_tree, tree_link
 
@@ -44,6 +45,7 @@ class Tree:
         payload_x: where it is in the frame of that link [m]; `payload_y`, `payload_z` likewise.
         tip_fx: force at the origin of the tool in the axes of the root [N]; `tip_fy`, `tip_fz`
             likewise.
+        pulls: other forces on the last link.
         text: joints of the URDF.
     """
 
@@ -59,6 +61,7 @@ class Tree:
     tip_fx: float = quantity(0.0, 'N', 'force at the tool')
     tip_fy: float = quantity(0.0, 'N', 'force at the tool')
     tip_fz: float = quantity(0.0, 'N', 'force at the tool')
+    pulls: tuple[ToolPull, ...] = ()
     text: TreeText = field(init=False)
     _library: Any = field(init=False, repr=False)
     _model: Any = field(init=False, repr=False)
@@ -69,6 +72,7 @@ class Tree:
     _motors: np.ndarray = field(init=False, repr=False)
     _identity: np.ndarray = field(init=False, repr=False)
     _tool: int = field(init=False, repr=False)
+    _last: int = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Compile the tree.
@@ -107,6 +111,7 @@ class Tree:
             '_motors': motors,
             '_identity': np.eye(model.nv),
             '_tool': int(model.body(tree_link(text.tool_link)).id),
+            '_last': int(model.body(tree_link(text.last_link)).id),
         }
         for name, value in built.items():
             object.__setattr__(self, name, value)
@@ -171,6 +176,11 @@ class Tree:
             jacobian = np.empty((3, model.nv))
             library.mj_jac(model, data, jacobian, None, data.xpos[self._tool], self._tool)
             force = force + jacobian.T @ tip
+        for pull in self.pulls:
+            turn = data.xmat[self._last].reshape(3, 3)
+            place, jacobian = data.xpos[self._last] + turn @ pull.at, np.empty((3, model.nv))
+            library.mj_jac(model, data, jacobian, None, place, self._last)
+            force = force + jacobian.T @ pull.force(place, jacobian @ data.qvel)
         return force
 
     def drive(self, command: np.ndarray, velocity: np.ndarray) -> np.ndarray:  # noqa: ARG002 - force sources
@@ -189,6 +199,17 @@ class Tree:
     def coefficients(self) -> tuple[TrueCoefficient, ...]:
         """Return nothing: the truth about a tree is its URDF."""
         return ()
+
+
+def pulled(tree: Mechanism, pull: ToolPull) -> Mechanism:
+    """Return the tree with a force on its last link.
+
+    Raises:
+        ConfigError: a robot with dynamics of its own, which has no such link.
+    """
+    if not isinstance(tree, Tree):
+        raise ConfigError('a law of the tool', 'a robot from a URDF')
+    return replace(tree, pulls=(*tree.pulls, pull))
 
 
 def mounted(tree: Mechanism, values: Mapping[str, Value]) -> Mechanism:

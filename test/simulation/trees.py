@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from sgp_proof.concealed import robots
@@ -16,6 +18,13 @@ def arm(rng_seed=0, limit=None):
         if limit is not None:
             object.__setattr__(body, 'limit', limit)
     return robots.urdf('arm', bodies)
+
+
+def spatial_arm(rng_seed=0):
+    """Return an arm of three joints, one about z and two about y."""
+    bodies = robots.yaw_pitch_pitch(np.random.default_rng(rng_seed))
+    named = [replace(b, joint=f'j{i}', link=f'link_{i}') for i, b in enumerate(bodies)]
+    return robots.urdf('spatial', named)
 
 
 def pendulum(mass=2.0, length=0.5, inertia=0.1):
