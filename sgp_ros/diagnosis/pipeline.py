@@ -55,6 +55,7 @@ from sgp_ros.diagnosis.reference import (
 from sgp_ros.diagnosis.result import Diagnosis, Proof
 from sgp_ros.diagnosis.setup.said import doubted_scales
 from sgp_ros.diagnosis.shown import Predictions, Traces
+from sgp_ros.diagnosis.unlisted.at_tool import tool_remarks
 from sgp_ros.diagnosis.wrong_bodies import parameter_errors, traded_remarks
 from sgp_ros.engine.config import EngineConfig
 from sgp_ros.engine.samples import Event
@@ -158,7 +159,8 @@ def _diagnosed(connected: Connected, robot: str, *, replays: bool) -> tuple[Diag
     verdict = verdict_of(decision, wrong, connected.findings, *connected.left, lags or differ)
     hidden = hides_friction(equations, comparison, decision) if verdict in _CALM else ()
     traded = traded_remarks(whole, model, wrong, recordings.unstated)
-    remarks = (*bound_remarks(decision), *left, *chain(*doubts.values()), *hidden, *traded)
+    said_of = (*tool_remarks(decision), *bound_remarks(decision))
+    remarks = (*said_of, *left, *chain(*doubts.values()), *hidden, *traded)
     is_doubted = bool(hidden) or rests_on(doubts, findings, tree.moving_names)
     said = Diagnosis(
         robot=robot,

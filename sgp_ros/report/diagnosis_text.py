@@ -21,7 +21,8 @@ from sgp_ros.diagnosis.setup.errors import ORIENTATION
 from sgp_ros.gp.scores import INTERVAL_95
 from sgp_ros.physics.catalogue import EFFECTS, words_of
 from sgp_ros.physics.parts import COULOMB
-from sgp_ros.physics.place import BASE, place_of_word
+from sgp_ros.physics.place import BASE, TOOL, place_of_word
+from sgp_ros.physics.tool_law import STATED
 
 UNKNOWN = 'unknown'
 """Name of what no effect of the catalogue describes."""
@@ -125,6 +126,8 @@ def effect_name(finding: Finding | Difference) -> str:
 
 def place(finding: Finding | Difference) -> str:
     """Return where an effect acts, in plain words."""
+    if isinstance(finding, Finding) and STATED.match(finding.formula):
+        return _PLACES[TOOL.value]
     return _where(finding.effect, finding.joint)
 
 

@@ -160,7 +160,7 @@ def formulas(
             if followed is not None:
                 left = (followed.left + noise) / (curve.size + noise)
                 freedom = PER_PARAMETER * len(formula.parameters - {'r'})
-                price = freedom + PER_PIECE * _pieces(formula)
+                price = freedom + PER_PIECE * pieces(formula)
                 yield 0.5 * ROWS * math.log(left) + price, text, followed
 
     found = sorted(tried(texts(smooth), {}), key=lambda f: f[0])
@@ -201,7 +201,8 @@ def nodes_of(smooth: SmoothForce, model: Model) -> tuple[np.ndarray, np.ndarray]
     return nodes, hats(nodes, rows, smooth.variable.values(motion))
 
 
-def _pieces(formula: Formula) -> float:
+def pieces(formula: Formula) -> float:
+    """Return the number of numbers, names and operations of a formula."""
     return formula.folded(lambda _node: 1.0, lambda _node, parts: 1.0 + sum(parts))
 
 
@@ -235,7 +236,7 @@ def law(
     parameters += others.values()
     gate = '' if smooth.is_of_own_speed else _OF_GATE.get(smooth.gate, smooth.gate)
     words = NEAREST.get(f'{text.removesuffix(" + d")} {gate}'.strip(), NAMELESS)
-    price = PER_UNUSUAL + PER_PIECE * _pieces(formula)
+    price = PER_UNUSUAL + PER_PIECE * pieces(formula)
     joint = motion.tree.moving_names[smooth.joint]
     return FoundLaw(smooth, text, formula, joint, parameters, words, price)
 

@@ -14,6 +14,7 @@ from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.shown import LawSearch, TriedFormula
 from sgp_ros.diagnosis.unlisted.assertion import Explained, with_laws
+from sgp_ros.diagnosis.unlisted.at_tool import with_tool_law
 from sgp_ros.diagnosis.unlisted.beside import law_of
 from sgp_ros.diagnosis.unlisted.formulas import FoundLaw
 from sgp_ros.diagnosis.unlisted.searched import Searched
@@ -51,7 +52,8 @@ def extended(several: Several) -> tuple[Several, tuple[LawSearch, ...]]:
     """Return the decision with a search for unlisted laws, in one recording."""
     if several.chances or several.equations.motion.is_static:
         return several, ()
-    found = with_laws(several.equations, several.comparison, several.decision)
+    equations = several.equations
+    found = with_laws(equations, *with_tool_law(equations, several.comparison, several.decision))
     several = replace(
         several, comparison=found.comparison, decision=found.decision, model=found.decision.model
     )
