@@ -38,6 +38,7 @@ from sgp_ros.physics.tool_law import (
     DISTANCE,
     MOTION,
     STATED,
+    UNITS,
     ToolLaw,
     tool_point,
 )
@@ -136,7 +137,7 @@ def _states(tree, q, v):
 def _law(path, formula, numbers, unit='1'):
     """Return a law of the tool whose numbers are all known, or start there."""
     formula = read_formula(formula, is_law=True)
-    names = formula.parameters - {'s', 'ds'} | {*ToolLaw.point_names(path)}
+    names = formula.parameters - UNITS.keys() | {*ToolLaw.point_names(path)}
     return ToolLaw(formula, path, [LawParameter(n, unit, start=numbers[n]) for n in sorted(names)])
 
 

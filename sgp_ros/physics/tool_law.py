@@ -5,8 +5,9 @@
     F_motion[tool] = -c*ds**2         drag
 
 `s` is the way along the path and `ds` its rate: a coordinate of the point of attachment in the
-axes of the root, its distance from a point of the world, or no more than its speed. The joints
-feel it by the principle of virtual work, `tau_x = F ds/dv`.
+axes of the root, its distance from a point of the world, or no more than its speed. `x`, `y` and
+`z` are its coordinates along any path. The joints feel the force by the principle of virtual work,
+`tau_x = F ds/dv`.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ ATTACHED, ANCHOR = ('ax', 'ay', 'az'), ('px', 'py', 'pz')
 """Point of attachment in the frame of the link that carries the tool, and that of the world in the
 axes of the root [m]."""
 WAY, RATE = 's', 'ds'
-UNITS = {WAY: 'm', RATE: 'm/s'}
+UNITS = dict.fromkeys((WAY, *AXES), 'm') | {RATE: 'm/s'}
+"""Names in a formula that are no parameters, with their units."""
 STATED = re.compile(r'\s*F_(\w+)\[tool\]\s*')
 """Left side of the formula of a law of the tool."""
 _STILL = 1e-9
@@ -110,9 +112,18 @@ class ToolLaw(FormulaLaw):
     def columns(self, motion: SeenMotion, place: Place, shape: np.ndarray) -> np.ndarray:
         """Return the efforts per factor, (n, k, m)."""
         numbers = self.shape_numbers(shape)
-        way, rate, efforts = self._way(motion, numbers)
-        F = self.per_factor(motion, {**numbers, WAY: way, RATE: rate})
+        _, efforts, F = self._force(motion, numbers)
         return efforts[:, :, None] * F[:, None, :]
+
+    def _force(
+        self, motion: SeenMotion, numbers: Mapping[str, float]
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return way (n,), efforts of a unit force (n, k), and force per factor (n, m)."""
+        assert motion.tool is not None
+        way, rate, efforts = self._way(motion, numbers)
+        place = motion.tool.points(np.array([numbers[n] for n in ATTACHED]))
+        seen = {WAY: way, RATE: rate} | dict(zip(AXES, place.T, strict=True))
+        return way, efforts, self.per_factor(motion, {**numbers, **seen})
 
     def _way(
         self, motion: SeenMotion, numbers: Mapping[str, float]
@@ -135,8 +146,8 @@ class ToolLaw(FormulaLaw):
     def sentence(self, at: Placed, motion: SeenMotion) -> str:
         """Return what the force is, where it acts, and how large it was over the way it saw."""
         numbers = self.shape_numbers(at.shape)
-        way, rate, _ = self._way(motion, numbers)
-        force = self.per_factor(motion, {**numbers, WAY: way, RATE: rate}) @ at.coefficients
+        way, _, factors = self._force(motion, numbers)
+        force = factors @ at.coefficients
         name, unit = (RATE, UNITS[RATE]) if self.path == MOTION else (WAY, UNITS[WAY])
         first, last = (float(force[i]) + 0.0 for i in (np.argmin(way), np.argmax(way)))
         where = ', '.join(f'{numbers[n]:.3g}' for n in ATTACHED)

@@ -26,7 +26,7 @@ from sgp_ros.physics.grammar import MEMORY
 from sgp_ros.physics.law import NAME, FormulaLaw
 from sgp_ros.physics.parts import LawParameter
 from sgp_ros.physics.place import TOOL
-from sgp_ros.physics.tool_law import ATTACHED, PATHS, RATE, STATED, UNITS, WAY, ToolLaw
+from sgp_ros.physics.tool_law import ATTACHED, PATHS, STATED, UNITS, ToolLaw
 from sgp_ros.physics.units import read_unit, unit_of, unit_text
 from sgp_ros.rigid.tree import Tree
 from sgp_ros.robots.entries import Entries, is_positive
@@ -118,8 +118,8 @@ def _formula(entries: Entries, joint: str, tree: Tree, *, is_tool: bool) -> Form
         return None
     if is_tool and (formula.signals or formula.functions & {*MEMORY}):
         entries.problems.append(
-            f'{entries.prefix}formula is {formula.text!r}; a law of the tool is one of {WAY} and '
-            f'{RATE} alone, without memory'
+            f'{entries.prefix}formula is {formula.text!r}; a law of the tool is one of '
+            f'{", ".join(UNITS)} alone, without memory'
         )
         return None
     others = sorted({j for _, j in formula.signals if j} - set(tree.moving_names))

@@ -42,13 +42,14 @@ class ToolPull:
         """Return the force where its point is and moves, (3,) [N]."""
         if self.path in AXES:
             i = AXES.index(self.path)
-            return self._size(place[i], velocity[i]) * np.eye(3)[i]
+            return self._size(place[i], velocity[i], place) * np.eye(3)[i]
         to = place - [self.numbers[n] for n in ANCHOR] if self.path == DISTANCE else velocity
         size = float(np.linalg.norm(to))
         if size == 0.0:
             return np.zeros(3)
         rate = float(to @ velocity) / size
-        return self._size(size, rate) * to / size
+        return self._size(size, rate, place) * to / size
 
-    def _size(self, way: float, rate: float) -> float:
-        return self.formula.value({**self.numbers, 's': way, 'ds': rate})
+    def _size(self, way: float, rate: float, place: np.ndarray) -> float:
+        seen = {'s': way, 'ds': rate} | dict(zip(AXES, place.tolist(), strict=True))
+        return self.formula.value({**self.numbers, **seen})

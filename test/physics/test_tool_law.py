@@ -87,9 +87,9 @@ def test_a_law_without_a_point_acts_on_the_tool():
     ('path', 'change', 'why'),
     [
         ('height', {}, "the path 'height'"),
-        ('x', {'text': 'b*s*t'}, 'one of s and ds alone'),
-        ('x', {'text': 'b*lag(s, r)'}, 'one of s and ds alone'),
-        ('x', {'text': 'b*q[j1]'}, 'one of s and ds alone'),
+        ('x', {'text': 'b*s*t'}, 'one of s, x, y, z, ds alone'),
+        ('x', {'text': 'b*lag(s, r)'}, 'one of s, x, y, z, ds alone'),
+        ('x', {'text': 'b*q[j1]'}, 'one of s, x, y, z, ds alone'),
         ('x', {'text': 'a*s'}, 'has the unit kg m2/s2, not N'),
         (DISTANCE, {'px': None}, 'px is None'),
         ('z', {'px': {'value': 1.0, 'unit': 'm'}}, "'px' is not in the formula"),

@@ -32,6 +32,7 @@ from sgp_ros.physics.tool_law import (
     AXES,
     DISTANCE,
     MOTION,
+    UNITS,
     ToolLaw,
     tool_point,
     tool_reach,
@@ -50,20 +51,39 @@ _STEPS = 20
 
 @dataclass(frozen=True, slots=True)
 class _Text:
-    """A formula along some paths, with words for people."""
+    """A formula along some paths, with words for people.
+
+    Attributes:
+        paths: along which it is tried.
+        text: of the formula.
+        words: for people.
+        is_first: whether a search starts with it; others start where these have led.
+    """
 
     paths: tuple[str, ...]
     text: str
     words: str
+    is_first: bool = True
 
 
+_IMMERSED = 'min(max((z0 - z)/w0, 0), 1)'
 _TEXTS = (
-    _Text((DISTANCE,), 'a', 'a constant pull on the tool towards a point of the world'),
-    _Text((DISTANCE,), 'b*s', 'a spring without a length from the tool to a point of the world'),
     _Text((DISTANCE,), 'a + b*s', 'a rope or spring from the tool to a point of the world'),
-    _Text((DISTANCE,), 'b*max(s - x0, 0)', 'a rope with slack to a point of the world'),
     _Text((DISTANCE,), 'm/s**2', 'a magnet at a point of the world'),
     _Text((DISTANCE,), '-c*ds', 'a damper from the tool to a point of the world'),
+    *(
+        _Text((DISTANCE,), text, words, is_first=False)
+        for text, words in (
+            ('a', 'a constant pull on the tool towards a point of the world'),
+            ('b*s', 'a spring without a length from the tool to a point of the world'),
+            ('b*max(s - x0, 0)', 'a rope with slack to a point of the world'),
+            ('a - f*sign(ds)', 'a rope over a drum with friction'),
+            ('a + b*s - f*sign(ds)', 'a rope over a drum with friction'),
+            ('a + b*s - c*ds', 'a spring and a damper from the tool to a point of the world'),
+            ('a*exp(-s/w0)', 'an attraction that fades with the distance'),
+            ('a/(1 + (s/w0)**2)**2', 'an attraction that fades with the distance'),
+        )
+    ),
     _Text(AXES, 'a + b*s', 'a spring on the tool along an axis of the base'),
     _Text(AXES, 'b*max(s - x0, 0)', 'a soft wall, floor or ceiling'),
     _Text(AXES, '-b*max(x0 - s, 0)', 'a soft wall, floor or ceiling'),
@@ -72,8 +92,12 @@ _TEXTS = (
     _Text((MOTION,), '-c*ds', 'viscous drag of the tool'),
     _Text((MOTION,), '-e*ds**2', 'drag of the tool in a fluid'),
     _Text((MOTION,), '-c*ds - e*ds**2', 'drag of the tool in a fluid'),
+    _Text((MOTION,), f'-c*ds*{_IMMERSED}', 'drag of the tool that dips into a fluid'),
+    _Text((MOTION,), f'-e*ds**2*{_IMMERSED}', 'drag of the tool that dips into a fluid'),
 )
-_UNITS = {'a': 'N', 'b': 'N/m', 'c': 'N s/m', 'e': 'N s2/m2', 'f': 'N', 'm': 'N m2', 'x0': 'm'}
+_UNITS = {'a': 'N', 'b': 'N/m', 'c': 'N s/m', 'e': 'N s2/m2', 'f': 'N', 'm': 'N m2'}
+_PLACES = ('x0', 'w0', 'z0')
+"""Numbers that are a place or a width, not a factor [m]."""
 _RESISTS = ('c', 'e', 'f')
 """Coefficients that take energy, and are not negative."""
 
@@ -102,7 +126,7 @@ def tool_models(columns: Columns, scale: Scale, decision: Decision) -> list[Mode
     motion, listed = columns.equations(frozenset()).motion, decision.tentative or decision.model
     found = list[Model]()
     for base in _bases(columns, listed):
-        trials = screen(columns, base, _laws(motion, ATTACHED))
+        trials = screen(columns, base, _laws(motion, ATTACHED, is_first=True))
         gained = scale.worth(listed) - scale.worth(base)
         for path, count in _FITTED.items():
             along = [s for gain, s in trials if 2.0 * gain > gained and _is_along(s, path)]
@@ -208,7 +232,9 @@ def _freed(columns: Columns, model: Model, known: Collection[str]) -> Model:
     return _fitted(columns, others, EffectAt(law, placed.place, shape), model)
 
 
-def _laws(motion: ObservedMotion, known: Collection[str]) -> Iterator[ToolLaw]:
+def _laws(
+    motion: ObservedMotion, known: Collection[str], *, is_first: bool = False
+) -> Iterator[ToolLaw]:
     """Yield the laws that are tried, with some coordinates of attachment those of the tool."""
     at, far = tool_point(motion.tree), _FAR * tool_reach(motion)
     around, size = tool_seen(motion).mean(axis=0), link_reach(motion, motion.tree.tool_body)
@@ -218,11 +244,11 @@ def _laws(motion: ObservedMotion, known: Collection[str]) -> Iterator[ToolLaw]:
     ]
     anchor = [LawParameter(n, 'm', x - far, start=x + 0.05 * far, high=x + far)
               for n, x in zip(ANCHOR, around.tolist(), strict=True)]  # fmt: skip
-    for text in _TEXTS:
+    for text in (x for x in _TEXTS if x.is_first or not is_first):
         formula = read_formula(text.text, is_law=True)
         price = PER_UNUSUAL + PER_PIECE * pieces(formula)
         for path in text.paths:
-            names = sorted(formula.parameters - {'s', 'ds'})
+            names = sorted(formula.parameters - UNITS.keys())
             own = [_parameter(n, path, motion) for n in names]
             yield ToolLaw(
                 formula, path, [*own, *points, *(anchor if path == DISTANCE else ())], text.words,
@@ -234,10 +260,13 @@ def _parameter(name: str, path: str, motion: ObservedMotion) -> LawParameter:
     """Return a number of a formula with its unit and range."""
     if name in _RESISTS:
         return LawParameter(name, _UNITS[name], 0.0)
-    if name != 'x0':
+    if name not in _PLACES:
         return LawParameter(name, _UNITS[name])
     low, high = 0.0, 3.0 * tool_reach(motion)
-    if path in AXES:
-        x = tool_seen(motion)[:, AXES.index(path)]
+    axis = 'z' if name == 'z0' else path
+    if name == 'w0':
+        low, high = 1e-2 * tool_reach(motion), tool_reach(motion)
+    elif axis in AXES:
+        x = tool_seen(motion)[:, AXES.index(axis)]
         low, high = float(x.min()), float(x.max())
-    return LawParameter(name, _UNITS[name], low, start=0.5 * (low + high), high=high)
+    return LawParameter(name, 'm', low, start=0.5 * (low + high), high=high)
