@@ -21,6 +21,7 @@ from sgp_ros.diagnosis.criteria import (
     LEAST_ODDS,
     LEAST_SHARE,
     MOST_CERTAIN,
+    NEARLY,
     PER_EFFECT,
     STANDING,
     TEMPER,
@@ -111,8 +112,13 @@ def settled(
 
 
 def _opens(scale: Scale, model: Model, fewer: Model) -> bool:
-    """Return whether a model does not describe a joint that the one it is to replace describes."""
-    return bool(((scale.excess(fewer) >= 1.0) & (scale.excess(model) < 1.0)).any())
+    """Return whether a model does not describe a joint that the one it is to replace describes.
+
+    Or of which that leaves clearly less.
+    """
+    described = scale.excess(model) < 1.0
+    described |= model.mean_square <= NEARLY * fewer.mean_square
+    return bool(((scale.excess(fewer) >= 1.0) & described).any())
 
 
 def settled_of(several: Several) -> tuple[Several, Contrasts, Probabilities]:

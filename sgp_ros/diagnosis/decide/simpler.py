@@ -81,10 +81,14 @@ def _on_its_joints(effect: EffectAt) -> Iterator[tuple[EffectAt, ...]]:
 
 
 def _of_fewer_numbers(effect: EffectAt, rivals: list[Model]) -> list[EffectAt]:
-    """Return the laws of fewer numbers that rivals have in the place of an effect."""
-    numbers = len(effect.effect.quantities)
+    """Return the laws of fewer numbers that rivals have in the place of an effect.
+
+    Which of several formulas says it best is decided before, where each has its price.
+    """
+    numbers, is_formula = len(effect.effect.quantities), effect.effect.has_chosen_form
     found = {s.key: s for m in rivals for s in m.effects
-             if s.place == effect.place and len(s.effect.quantities) < numbers}  # fmt: skip
+             if s.place == effect.place and len(s.effect.quantities) < numbers
+             and not (is_formula and s.effect.has_chosen_form)}  # fmt: skip
     return list(found.values())
 
 

@@ -216,7 +216,7 @@ def test_a_rotor_takes_the_place_of_a_gain_that_is_worth_as_much(equations_for):
     assert simpler(equations, decision, better) is None
 
 
-def test_a_law_of_fewer_numbers_that_is_worth_as_much_is_named(equations_for):
+def test_a_law_of_fewer_numbers_that_is_worth_as_much_is_named(equations_for, monkeypatch):
     """The limit of a drive, in place of one that falls with a speed that hardly matters."""
     limit = 4.0
     world = simulate(CHAINS[1], 4, 10.0, motor=lambda u, _now: [min(max(u[-1][0], -limit), limit)])
@@ -234,6 +234,22 @@ def test_a_law_of_fewer_numbers_that_is_worth_as_much_is_named(equations_for):
     far = SimpleNamespace(worth=lambda m: 2.0 * ALIKE * (m is model))
     assert simpler(equations, SimpleNamespace(model=model, rivals=(rival,)), far) is None
     assert simpler(equations, SimpleNamespace(model=rival, rivals=(model,)), alike) is None
+    for name in ('motor_speed_limit', 'saturation'):  # of formulas the best was taken before
+        monkeypatch.setattr(EFFECTS[name], 'has_chosen_form', True)
+    assert simpler(equations, SimpleNamespace(model=model, rivals=(rival,)), alike) is None
+
+
+@pytest.mark.parametrize(
+    ('excess', 'left', 'opens'),
+    [((0.5, 2.0), (1.0, 1.5), True), ((1.5, 2.0), (1.0, 1.5), False),
+     ((1.5, 9.0), (1.0, 4.0), True), ((0.5, 0.9), (1.0, 9.0), False)],
+)  # fmt: skip
+def test_a_model_that_leaves_clearly_more_opens_a_joint(excess, left, opens):
+    """Also where the better one leaves some: a relay left 0.7 % of what friction left 6 %."""
+    model, fewer = (SimpleNamespace(name=i, mean_square=np.array([x, 1.0]))
+                    for i, x in enumerate(left))  # fmt: skip
+    scale = SimpleNamespace(excess=lambda m: np.array([excess[m.name], 0.1]))
+    assert certainty._opens(scale, model, fewer) is opens
 
 
 @pytest.mark.parametrize(
