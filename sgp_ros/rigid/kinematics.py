@@ -12,25 +12,19 @@ from sgp_ros.rigid.tree import Tree
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinkMotion:
-    """Motion of a link that hangs on d joints, at n positions of the k that move on their own.
+    """Motion of a link at n positions of the k joints that move on their own.
 
-    All directions are along the axes of the root.
+    Where a point of the link is and how it moves are linear in its coordinates in the frame of the
+    joint of the link, `x = p + R at`. All directions are along the axes of the root. Samples come
+    last in memory.
 
     Attributes:
-        rotation: (n, 3, 3) from the frame of its joint to that of the root.
-        origin: (n, 3) of that frame [m].
-        axes: (n, d, 3) of the joints.
-        starts: (n, d, 3) points on these axes [m].
-        slides: (d,) whether each joint slides.
-        gains: (d, k) its motion per motion of the joints that move on their own.
+        places: (4, 3, n) R by its columns, and p [m].
+        moves: (4, k, 3, n) their slopes along the motion of each joint.
     """
 
-    rotation: np.ndarray
-    origin: np.ndarray
-    axes: np.ndarray
-    starts: np.ndarray
-    slides: np.ndarray
-    gains: np.ndarray
+    places: np.ndarray
+    moves: np.ndarray
 
     @classmethod
     def of(cls, tree: Tree, q: np.ndarray, body: int) -> LinkMotion:
@@ -51,18 +45,29 @@ class LinkMotion:
             R = R @ np.einsum('tn,tab->nab', np.stack(parts)[..., 0], g.turns[i])
             axes.append(R @ g.axes[i])
             starts.append(p)
-        gains = g.gains[chain, None] * (g.rows[chain, None] == np.arange(g.size))
-        return cls(R, p, np.stack(axes, 1), np.stack(starts, 1), g.slidings[chain], gains)
+        places = np.stack([*np.moveaxis(R, 2, 0), p])
+        moves = np.zeros((4, g.size, len(q), 3))
+        for i, axis, start in zip(chain, axes, starts, strict=True):
+            arms = np.stack([*places[:3], p - start])
+            slope = np.cross(axis, arms)
+            if g.slidings[i]:
+                slope = np.stack([*np.zeros_like(arms[:3]), axis])
+            moves[:, g.rows[i]] += g.gains[i] * slope
+        last = [np.ascontiguousarray(np.swapaxes(x, -1, -2)) for x in (places, moves)]
+        return cls(*last)
 
     def points(self, at: np.ndarray) -> np.ndarray:
         """Return where a point `at` (3,) of the link is, (n, 3) [m]."""
-        return np.asarray(self.origin + self.rotation @ at)
+        return _at(self.places, at).T
 
     def columns(self, at: np.ndarray) -> np.ndarray:
         """Return the efforts of a unit force along each root axis on a point, (n, k, 3).
 
         They are the transposed Jacobian of the point, by the principle of virtual work.
         """
-        arms = self.points(at)[:, None] - self.starts
-        J = np.where(self.slides[:, None], self.axes, np.cross(self.axes, arms))
-        return np.einsum('ndx,dk->nkx', J, self.gains)
+        return _at(self.moves, at).transpose(2, 0, 1)
+
+
+def _at(linear: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Return what is linear in the coordinates of a point, (4, ...), there."""
+    return (np.append(at, 1.0) @ linear.reshape(4, -1)).reshape(linear.shape[1:])
