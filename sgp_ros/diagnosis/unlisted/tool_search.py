@@ -134,12 +134,22 @@ def tool_models(columns: Columns, scale: Scale, decision: Decision) -> list[Mode
     found += _from_there(columns, _ranked(found, scale))
     for model in _unlike(_ranked(found, scale))[:_REFINED]:
         found += _attached(columns, scale, model)
-    for model in _unlike(_ranked(found, scale))[:_REFINED]:
-        again = by_joint(columns, model)
-        found += again
-        found += [x for m in _ranked(again, scale)[:1] for x in _attached(columns, scale, m)]
+    found += _beside(columns, scale, _unlike(_ranked(found, scale)))
     found += _from_there(columns, _ranked(found, scale))
     return _unlike(_ranked(found, scale))
+
+
+def _beside(columns: Columns, scale: Scale, ranked: list[Model]) -> Iterator[Model]:
+    """Yield models with listed effects searched again, as long as one may become the best."""
+    gained = np.inf
+    for model in ranked[:_REFINED]:
+        if scale.worth(ranked[0]) - scale.worth(model) > gained:
+            return
+        again = by_joint(columns, model)
+        more = [x for m in _ranked(again, scale)[:1] for x in _attached(columns, scale, m)]
+        yield from (*again, *more)
+        if model is ranked[0]:
+            gained = max(scale.worth(m) for m in (model, *more)) - scale.worth(model)
 
 
 def _is_along(s: EffectAt, path: str) -> bool:
