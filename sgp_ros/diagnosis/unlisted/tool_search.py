@@ -7,7 +7,7 @@ it, then with the point of attachment free, each jointly with bodies and all oth
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -157,25 +157,47 @@ def _is_along(s: EffectAt, path: str) -> bool:
 
 
 def _from_there(columns: Columns, ranked: list[Model]) -> Iterator[Model]:
-    """Yield models with other formulas along the path of the best one, from its points."""
+    """Yield models with all formulas along the path of the best one, from its points.
+
+    They start from the mirror image of the point of the world, too: far away, a force towards one
+    is a force away from the other, and no search gets there without passing through infinity.
+    """
     motion = columns.equations(frozenset()).motion
+    middle = dict(zip(ANCHOR, tool_seen(motion).mean(axis=0).tolist(), strict=True))
     for best in ranked[:1]:
-        placed = tool_law_of(best)
-        assert placed is not None
-        assert isinstance(placed.effect, ToolLaw)
-        points = {n: x for n, x in placed.report(motion).items() if n in {*ATTACHED, *ANCHOR}}
-        others = tuple(s for s in best.effects if s is not placed)
-        for law in _laws(motion, [*placed.effect.known]):
-            if law.path == placed.effect.path and law.key != placed.effect.key:
-                numbers = {q.name: q.start for q in law.quantities if isinstance(q, LawParameter)}
-                shape = [float((numbers | points)[n]) for n in law.shape_names()]
-                start = EffectAt(law, placed.place, np.array(shape))
-                yield _fitted(columns, others, start, best)
+        own, numbers = _numbers(best)
+        near = {n: x for n, x in numbers.items() if n in {*ATTACHED, *ANCHOR}}
+        far = {n: 2.0 * x - near[n] for n, x in middle.items() if n in near}
+        for law in (x for x in _laws(motion, [*own.known]) if x.path == own.path):
+            starts = {q.name: q.start for q in law.quantities if isinstance(q, LawParameter)}
+            if law.key != own.key:
+                yield _instead(columns, best, law, starts | near)
+            if far:
+                yield _instead(columns, best, law, starts | near | far)
 
 
 def tool_law_of(model: Model) -> EffectAt | None:
     """Return the law of the tool in a model; None where there is none."""
     return next((s for s in model.effects if isinstance(s.effect, ToolLaw)), None)
+
+
+def _numbers(model: Model) -> tuple[ToolLaw, dict[str, float]]:
+    """Return the law of the tool of a model with its numbers by name."""
+    placed = tool_law_of(model)
+    assert placed is not None
+    assert isinstance(placed.effect, ToolLaw)
+    return placed.effect, placed.effect.shape_numbers(placed.shape)
+
+
+def _instead(
+    columns: Columns, model: Model, law: ToolLaw, numbers: Mapping[str, float]
+) -> Model:  # fmt: skip
+    """Return a model with a law of the tool in place of its own, fitted from some numbers."""
+    placed = tool_law_of(model)
+    assert placed is not None
+    others = tuple(s for s in model.effects if s is not placed)
+    shape = np.array([numbers[n] for n in law.shape_names()])
+    return _fitted(columns, others, EffectAt(law, placed.place, shape), model)
 
 
 def _ranked(models: Iterable[Model], scale: Scale) -> list[Model]:
@@ -233,13 +255,9 @@ def _attached(columns: Columns, scale: Scale, model: Model) -> Iterator[Model]:
 
 def _freed(columns: Columns, model: Model, known: Collection[str]) -> Model:
     """Return a model with the point of attachment free, but for some of its coordinates."""
-    placed, motion = tool_law_of(model), columns.equations(frozenset()).motion
-    assert placed is not None
-    law = next(x for x in _laws(motion, known) if x.key == placed.effect.key)
-    numbers = placed.report(motion)
-    shape = np.array([float(numbers[n]) for n in law.shape_names()])
-    others = tuple(s for s in model.effects if s is not placed)
-    return _fitted(columns, others, EffectAt(law, placed.place, shape), model)
+    own, numbers = _numbers(model)
+    laws = _laws(columns.equations(frozenset()).motion, known)
+    return _instead(columns, model, next(x for x in laws if x.key == own.key), numbers)
 
 
 def _laws(
