@@ -142,10 +142,12 @@ def _connected(
             on_band = compared(plain.recordings, tree, next(each), cutoff)
             gain = _gain(on_band, corrected, price)
     is_one_law = _stands_for_gains(plain, found)
-    if gain < (-ALIKE if is_one_law else PER_EFFECT):
+    if gain < _least_gain(found, price, is_one_law=is_one_law):
         gain = max(gain, min(foreseeable, 0.0))  # a search on corrected recordings found less
         is_alike = gain + rare >= -ALIKE
         return _beside(plain, found.errors, gain, _named(corrected)) if is_alike else plain
+    is_alike = is_one_law or gain < PER_EFFECT
+    equal = _imitated_by(plain, corrected) if is_alike else ()
     if is_one_law:  # under another name it is there anyway
         gain = max(gain, found.end.evidence - found.start.evidence - price)
     found, corrected = _refined(plain, found, corrected, tree, each)
@@ -161,7 +163,8 @@ def _connected(
             return _beside(kept, [dropped], gain, _named(corrected)) if is_alike else kept
     return replace(
         corrected, findings=errors,
-        equivalents=equal_errors(found), delay_std=found.delay_std, uncorrected=plain, price=price,
+        equivalents=(*equal, *equal_errors(found)), delay_std=found.delay_std,
+        uncorrected=plain, price=price,
         remarks=(*(f'{e.remedy} {_CORRECTED}' for e in found.errors), *plain.recordings.remarks),
     )  # fmt: skip
 
@@ -232,10 +235,22 @@ def _may_be_a_law(plain: Connected, corrected: Connected) -> bool:
     )
 
 
-def _stands_for_gains(plain: Connected, found: Connection) -> bool:
-    """Return whether the gain of a motor imitates those of its drive, both scaled alike.
+def _least_gain(found: Connection, price: float, *, is_one_law: bool) -> float:
+    """Return what errors must gain over physics [nats].
 
-    Where commands are position targets, the motor that multiplies them is the drive.
+    Other gains of a drive are what is stated least surely where commands are targets: they need
+    not be clearly better, and no better where physics only stands for them.
+    """
+    if is_one_law:
+        return -ALIKE - price
+    return 0.0 if all(e.hypothesis.is_of_gains for e in found.errors) else PER_EFFECT
+
+
+def _stands_for_gains(plain: Connected, found: Connection) -> bool:
+    """Return whether the gain of a motor imitates those of its drive.
+
+    Where commands are position targets, the motor that multiplies them is the drive. Scaled
+    unlike, they are its gain and viscous friction.
     """
     named = {e.hypothesis.joint for e in found.errors if 'kp' in e.hypothesis.names}
     scaled = {joint for effect, joint in _named(plain) if effect == TORQUE_GAIN.name}
@@ -263,6 +278,12 @@ def _named(connected: Connected) -> frozenset[tuple[str, str]]:
     """Return the names and joints of the effects that are asserted."""
     motion, model = connected.equations.motion, connected.several.decision.model
     return frozenset((s.name, joint_name(motion, s.place.joint)) for s in model.effects)
+
+
+def _imitated_by(plain: Connected, corrected: Connected) -> tuple[Equivalent, ...]:
+    """Return the physics that errors of the connection took the place of, where there is any."""
+    named = sorted((joint, effect) for effect, joint in _named(plain) - _named(corrected))
+    return (Equivalent(tuple(named), '', 1.0),) if named else ()
 
 
 def _beside(

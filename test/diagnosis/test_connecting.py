@@ -12,7 +12,7 @@ import pytest
 from sgp_ros.diagnosis import connecting
 from sgp_ros.diagnosis.connected import Connected
 from sgp_ros.diagnosis.connecting import in_halves
-from sgp_ros.diagnosis.criteria import ALIKE, TEMPER
+from sgp_ros.diagnosis.criteria import ALIKE, PER_EFFECT, TEMPER
 from sgp_ros.diagnosis.setup.connection import Connection, Tried
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.physics.catalogue import TORQUE_GAIN
@@ -260,6 +260,27 @@ def test_gains_that_a_torque_constant_imitates_are_as_certain_as_their_search(
         monkeypatch.setattr(connecting, name, stub)
     connecting._connected(_of(10.0), found, None, in_halves(lambda _: None))
     assert said == ([told] if is_one_law else [])
+
+
+@pytest.mark.parametrize(('is_of_gains', 'gain', 'is_asserted'), [
+    (True, 5.0, True), (True, -5.0, False), (False, 5.0, False), (False, 15.0, True)])  # fmt: skip
+def test_gains_need_not_be_clearly_better_than_physics(
+    monkeypatch, is_of_gains, gain, is_asserted
+):
+    """They are what is stated least surely; the physics in their place is said to be equal."""
+    corrected = _of(10.0)
+    found = _found(monkeypatch, lambda *_: corrected, ())
+    found.errors[0].hypothesis.is_of_gains = is_of_gains
+    for name, stub in {
+        '_gain': lambda *_: gain, 'price_of': lambda _: (10.0, 0.0),
+        '_named': lambda c: frozenset() if c.correction else {('drag', 'knee')},
+    }.items():  # fmt: skip
+        monkeypatch.setattr(connecting, name, stub)
+    said = connecting._connected(_of(10.0), found, None, in_halves(lambda _: None))
+    assert bool(said.findings) is is_asserted
+    if is_asserted:
+        physics = [(('knee', 'drag'),)] if gain < PER_EFFECT else []
+        assert [e.effects for e in said.equivalents] == physics
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,8 @@ def search(probe: Probe) -> Connection:
 
     A delay of targets looks like other gains of every drive, so a search that adds errors one by
     one would not return to it: where a delay is worth its price, the search begins with it. If
-    the result leaves a residual that counts as physics, a second search begins without it.
+    the result leaves a residual that counts as physics, a second search begins without it, and a
+    third with a delay beside the gains that were found then, which may have hidden it.
     """
     none = Correction.none(probe.motion.tree.size)
     start = probe.agreement(none)
@@ -42,6 +43,9 @@ def search(probe: Probe) -> Connection:
             chains.append(_grown(probe, [first], first.agreement))
     if all(c[-1].agreement.left.max() > COUNTED_SHARE for c, _ in chains):
         chains.append(_grown(probe, [], start))
+        for delayed in _delayed(probe, chains[-1][0]):
+            more, beside = _grown(probe, delayed, delayed[-1].agreement)
+            chains.append((more, chains[-1][1] | beside))
     best, rivals = max(chains, key=lambda c: _worth(c[0], start))
     # physics beside them stays to be found
     errors = undoing([e for e in best if not e.hypothesis.is_physics])
@@ -60,6 +64,21 @@ def _physics(probe: Probe, h: Hypothesis) -> Tried:
     left = np.array([probe.agreement(h.applied(none, x)).left for x in h.starts])  # (s, k)
     starts = h.starts[np.unique(left.argmin(axis=0))]
     return max((_refined(probe, none, h, x) for x in starts), key=lambda t: t.worth)
+
+
+def _delayed(probe: Probe, errors: list[Tried]) -> list[list[Tried]]:
+    """Return gains of drives with a delay beside them, with all numbers searched at once."""
+    if not any(e.hypothesis.is_of_gains for e in errors):
+        return []
+    starts = [(h, x) for h in hypotheses(probe.full) if h.is_physics for x in h.starts]
+    found = [_together(probe, [_tried(probe, h, x), *errors]) for h, x in starts]
+    late = [f for f in found if f[0].hypothesis.is_physics]
+    return sorted(late, key=lambda f: f[-1].agreement.evidence)[-1:]
+
+
+def _tried(probe: Probe, h: Hypothesis, x: np.ndarray) -> Tried:
+    correction = h.applied(Correction.none(probe.motion.tree.size), x)
+    return Tried(h, x, np.zeros(len(x)), correction, probe.agreement(correction))
 
 
 def _worth(errors: Sequence[Tried], start: Agreement) -> float:

@@ -16,6 +16,7 @@ from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
 from sgp_ros.diagnosis.unlisted.tool_search import is_asked, tool_law_of, tool_models
+from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.tool_law import ToolLaw
 
 _RIVALS = 4
@@ -27,7 +28,8 @@ def with_tool_law(
     """Return comparison and decision with a law of the tool, where it explains more.
 
     It is asserted where it leaves no joint that it acts on unexplained, none of its numbers is at
-    a bound, and no other formula of a path says as much. Where it is worth more than all listed
+    a bound, no friction beside it is less than stated, which it might stand for, and no other
+    formula of a path says as much. Where it is worth more than all listed
     effects and yet not asserted, the joint that it acts on most is unexplained.
 
     Args:
@@ -76,6 +78,12 @@ def _is_limit(model: Model) -> bool:
     return law is not None and bool(law.at_bounds(model.frame.equations.motion))
 
 
+def _is_less(s: EffectAt) -> bool:
+    """Return whether an effect that takes energy gives it: there is less than is stated."""
+    term = s.effect.term
+    return term is not None and term.is_dissipative and bool((s.coefficients < 0.0).any())
+
+
 def _shares(model: Model) -> np.ndarray:
     """Return the share of the mean squared effort that a law of the tool has at joints (k,)."""
     index = [s is tool_law_of(model) for s in model.effects].index(True)
@@ -92,6 +100,8 @@ def _doubt(equations: Equations, comparison: Comparison, decision: Decision) -> 
     acted = _shares(decision.model) > COUNTED_SHARE
     if acted[list(decision.unknown)].any():
         return 'it leaves physics at a joint on which it acts'
+    if any(_is_less(s) and acted[s.place.joint] for s in decision.model.effects):
+        return 'friction beside it is less than the robot file states: it may stand for the rest'
     contrasts = Contrasts(equations, decision.model)
     chances = probabilities(equations, comparison, decision, contrasts)
     index = [s is law for s in decision.model.effects].index(True)

@@ -117,6 +117,19 @@ def test_gains_are_found_beside_a_delay_of_the_targets():
     assert error.correction.clock == 0.0
 
 
+def test_a_delay_that_gains_hide_is_found_beside_them():
+    """Alone neither explains the motion."""
+    raw, tree = _raw(CASES / 'case_08')
+    late = replace(raw, drive=raw.drive.changed(lambda targets: targets, -0.02))
+    probe = Probe(late, tree, choose_bandwidth(late, tree), knows_bodies=True)
+    (gains,) = (h for h in hypotheses(probe.full) if h.key[:2] == ('gain_scale', 'shoulder'))
+    alone = searching._refined(probe, Correction.none(tree.size), gains, np.array([1.0, 1.0]))
+    ((delay, beside),) = searching._delayed(probe, [alone])
+    assert delay.numbers == pytest.approx([0.02], abs=0.001)
+    assert beside.numbers == pytest.approx([0.8, 1.0], abs=0.02)
+    assert searching._delayed(probe, []) == []
+
+
 def test_a_delay_and_gains_are_searched_together():
     """From numbers that are wrong in both."""
     raw, tree = _raw(CASES / 'case_08')
