@@ -50,8 +50,8 @@ NONE = 'none'
 SAME = 0.02
 """Greatest error of a force that is the true one, relative to the effort that it takes."""
 _SHARE, _MOST = (0.01, 0.2), 1.0
-"""Share of the mean squared effort of some joint that springs and loads leave of the force; the
-most of all efforts that the force may be."""
+"""Share of the mean squared effort of some joint that springs, loads and friction leave of the
+force; the most of all efforts that the force may be."""
 _TRIES = 40
 
 
@@ -171,17 +171,22 @@ def _sized(rng, family, motion, effort):
     wanted = float(np.exp(rng.uniform(*np.log(_SHARE))))
     numbers['a'] = float(np.sqrt(wanted / share.max()))
     if np.mean((numbers['a'] * force) ** 2) > _MOST * np.mean(effort**2):
-        raise UnsuitableError('a force that is hardly more than springs and loads')
+        raise UnsuitableError('a force that is hardly more than springs, loads and friction')
     values = {q.name: numbers[q.name] for q in law.quantities}
     return EffectAt.wanted(_law(path, family.formula, numbers), 'tool', values), wanted
 
 
 def _beyond_listed(force, motion):
-    """Return what springs and loads on each joint, and a constant force, leave of one, (n, k)."""
+    """Return what springs, loads and friction of each joint leave of a force, (n, k).
+
+    And a constant force on the tool.
+    """
     n, k = force.shape
     columns = [
-        np.eye(k)[j] * x[:, None] for j in range(k) for x in (np.ones(n), motion.position[:, j])
-    ]
+        np.eye(k)[j] * x[:, None] for j, (q, v) in
+        enumerate(zip(motion.position.T, motion.velocity.T, strict=True))
+        for x in (np.ones(n), q, v, np.sign(v))
+    ]  # fmt: skip
     X = np.stack([*columns, *np.moveaxis(motion.tool_columns, 2, 0)], axis=2).reshape(n * k, -1)
     y = force.ravel()
     return (y - X @ np.linalg.lstsq(X, y, rcond=None)[0]).reshape(n, k)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from sgp_ros.diagnosis.compare.equations import Equations
-from sgp_ros.diagnosis.criteria import ALIKE, COUNTED_SHARE, LEAST_LAW
+from sgp_ros.diagnosis.criteria import ALIKE, COUNTED_SHARE, INTERVAL, LEAST_LAW
 from sgp_ros.diagnosis.decide.certainty import probabilities
 from sgp_ros.diagnosis.decide.decision import Decision, decide, refused
 from sgp_ros.diagnosis.decide.equivalence import Contrasts
@@ -15,6 +15,7 @@ from sgp_ros.diagnosis.decide.scale import Scale
 from sgp_ros.diagnosis.explain.comparison import Comparison
 from sgp_ros.diagnosis.explain.fitted_model import Model
 from sgp_ros.diagnosis.explain.regression import Columns
+from sgp_ros.diagnosis.explain.uncertainty import reported_std
 from sgp_ros.diagnosis.unlisted.tool_search import is_asked, tool_law_of, tool_models
 from sgp_ros.physics.effect_at import EffectAt
 from sgp_ros.physics.tool_law import ToolLaw
@@ -46,8 +47,8 @@ def with_tool_law(
     if not models or scale.worth(models[0]) <= scale.worth(listed) + ALIKE:
         return comparison, decision
     least = scale.worth(models[0]) - ALIKE
-    inside = (m for m in models if not _is_limit(m) and scale.worth(m) > least)
-    best = next(inside, models[0])
+    alike = [m for m in models if not _is_limit(m) and scale.worth(m) > least]
+    best = next((m for m in alike if _is_sized(m, columns)), (alike or models)[0])
     rivals = tuple(m for m in models if m is not best)[:_RIVALS]
     with_best = replace(comparison, more=(*comparison.more, best))
     found = decide(equations, with_best)
@@ -76,6 +77,16 @@ def _is_limit(model: Model) -> bool:
     """Return whether a number of a law of the tool is at its bound: another formula says it."""
     law = tool_law_of(model)
     return law is not None and bool(law.at_bounds(model.frame.equations.motion))
+
+
+def _is_sized(model: Model, columns: Columns) -> bool:
+    """Return whether the 95 % interval of each size of a law of the tool excludes none."""
+    placed = tool_law_of(model)
+    assert placed is not None
+    std = reported_std(model, columns)[model.effects.index(placed)]
+    numbers = placed.report(model.frame.equations.motion)
+    return all(abs(float(numbers[q.name]) - q.neutral) > INTERVAL * std.get(q.name, 0.0)
+               for q in placed.sizes)  # fmt: skip
 
 
 def _is_less(s: EffectAt) -> bool:
