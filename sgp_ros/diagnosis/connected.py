@@ -29,7 +29,8 @@ from sgp_ros.diagnosis.result import Equivalent, Finding
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.evidence import Probe
 from sgp_ros.diagnosis.shown import LawSearch, Predictions
-from sgp_ros.physics.catalogue import COMMAND_DELAY, TORQUE_GAIN
+from sgp_ros.physics.catalogue import ARMATURE, COMMAND_DELAY, TORQUE_GAIN
+from sgp_ros.physics.servo import Servo
 from sgp_ros.rigid.tree import Tree
 
 
@@ -164,13 +165,42 @@ class Connected:
 def compared(
     recordings: Recordings, tree: Tree, progress: Callable[[float], None], most_hz: float = np.inf
 ) -> Connected:
-    """Return the models that are compared on recordings as they are, up to a cut-off [Hz]."""
+    """Return the models that are compared on recordings as they are, up to a cut-off [Hz].
+
+    Rotors that the robot file does not have change the ripple of held targets: where some are
+    found, all is compared again with these, and what leaves less counts.
+    """
+    found = _compared(recordings, tree, progress, most_hz)
+    rotors = _rotors_of_ripple(found)
+    if not rotors.any():
+        return found
+    turned = recordings.changed(
+        lambda raw: replace(raw, gains=raw.gains and replace(raw.gains, rotors=rotors))
+    )
+    again = _compared(turned, tree, lambda _share: None, most_hz)
+    return min(found, again, key=lambda c: float(c.unexplained.sum()))
+
+
+def _compared(
+    recordings: Recordings, tree: Tree, progress: Callable[[float], None], most_hz: float
+) -> Connected:
     of = equations_of(recordings, tree, most_hz)
     equations, count = of(recordings.learned), len(recordings.names)
     several = decide_several(
         equations, count, progress, lambda r: of(alone(recordings.learned, r))
     )
     return Connected(recordings, equations, several, remarks=recordings.remarks)
+
+
+def _rotors_of_ripple(found: Connected) -> np.ndarray:
+    """Return the rotors that were found where samples show a ripple, else none, (k,)."""
+    drive, decision = found.equations.motion.drive, found.several.decision
+    rotors = np.zeros(found.equations.d.shape[1])
+    if isinstance(drive, Servo) and drive.ripple is not None:
+        for s in (decision.tentative or decision.model).effects:
+            if s.effect is ARMATURE:
+                rotors[s.place.joint] += max(float(s.coefficients[0]), 0.0)
+    return rotors
 
 
 def equations_of(

@@ -36,12 +36,14 @@ class Gains:
         holds_gravity: whether the drives add what the nominal robot takes against gravity.
         is_recorded: whether the gains stand in the recording, beside each target; `kp` and `kd`
             are then factors of these [1].
+        rotors: (k,) inertia that they move beside that of the robot file [kg m^2 or kg].
     """
 
     kp: np.ndarray
     kd: np.ndarray
     holds_gravity: bool = False
     is_recorded: bool = False
+    rotors: np.ndarray | None = None
 
     def effort(self, target: np.ndarray, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return what the drives make of targets, without feed-forward, (k,) [N m or N].

@@ -13,10 +13,15 @@ from sgp_ros.diagnosis import connected
 from sgp_ros.diagnosis.compare.volume import Loop
 from sgp_ros.diagnosis.connected import Connected
 from sgp_ros.diagnosis.criteria import PER_EFFECT, STATED_ERROR
-from sgp_ros.diagnosis.gathered import Knowledge, gather
+from sgp_ros.diagnosis.gathered import Knowledge, Recordings, gather
 from sgp_ros.diagnosis.result import Finding, Location
 from sgp_ros.diagnosis.setup.correction import Correction
 from sgp_ros.diagnosis.setup.unknowns import Agreement
+from sgp_ros.physics.catalogue import ARMATURE
+from sgp_ros.physics.effect_at import EffectAt
+from sgp_ros.physics.place import Place
+from sgp_ros.physics.servo import Servo
+from sgp_ros.robots.gains import Gains
 from test.diagnosis.worlds import CHAINS, events_of, heavier, simulate
 
 
@@ -30,6 +35,11 @@ class _AsGiven:
 
     def worth(self, model):
         return model.worth
+
+
+@dataclass(frozen=True)
+class _Driven:
+    gains: Gains
 
 
 def test_an_error_has_to_explain_more_than_the_best_model_that_is_not_asserted(monkeypatch):
@@ -204,3 +214,36 @@ def test_a_correction_shows_with_the_laws_that_were_found(robots, offset, undone
         assert gain > PER_EFFECT
     else:
         assert gain < -100.0
+
+
+@pytest.mark.parametrize(
+    ('left', 'is_again'), [((0.01, 0.001), True), ((0.001, 0.01), False)]
+)  # fmt: skip
+def test_held_targets_meet_the_rotors_that_were_found(monkeypatch, left, is_again):
+    """Their ripple follows from all inertia; recordings without one are compared once."""
+    seen = []
+
+    def compare(recordings, *_):
+        rotors = recordings.learned.gains.rotors
+        seen.append(None if rotors is None else rotors.tolist())
+        model = SimpleNamespace(
+            effects=(EffectAt(ARMATURE, Place(1), coefficients=np.array([0.3])),)
+        )
+        drive = Servo(None, 0.0, (0,), *[np.zeros(2)] * 5, ripple=ripple)
+        return SimpleNamespace(
+            equations=SimpleNamespace(motion=SimpleNamespace(drive=drive), d=np.zeros((1, 2))),
+            several=SimpleNamespace(decision=SimpleNamespace(tentative=None, model=model)),
+            unexplained=np.array([left[len(seen) - 1]]),
+        )
+
+    ripple = None
+    monkeypatch.setattr(connected, '_compared', compare)
+    raw = _Driven(Gains(np.ones(2), np.ones(2)))
+    recordings = Recordings(('a',), raw, {}, {}, (), ())
+    connected.compared(recordings, None, None)
+    assert seen == [None]
+    ripple = object()
+    seen.clear()
+    found = connected.compared(recordings, None, None)
+    assert seen == [None, [0.0, 0.3]]
+    assert float(found.unexplained[0]) == left[is_again]

@@ -236,6 +236,7 @@ def _servo(targets: RecordedCommands, gains: Gains, motion: ObservedMotion) -> S
     ):
         tree, k = motion.tree, motion.tree.size
         mass = mass_matrix(tree, tree.parameters, motion.position)
+        mass = mass + np.diag(np.zeros(k) if gains.rotors is None else gains.rotors)
         wanted, pair = targets.values[:, :k], (gains.kp, gains.kd)
         ripple = Ripple.of(targets.times, wanted, motion.time, motion.step, pair, mass)
     return Servo(
