@@ -31,6 +31,7 @@ WITHHELD = ROOT / 'sgp_proof/results/withheld.json'
 NO_LAW = ROOT / 'sgp_proof/results/no_law.json'
 ELASTIC = ROOT / 'sgp_proof/results/elastic.json'
 MOUNT = ROOT / 'sgp_proof/results/mount.json'
+TOOL = ROOT / 'sgp_proof/results/tool_forces.json'
 _HEAD = (Path(__file__).parent / 'templates/unlisted.txt').read_text(encoding='utf-8')
 
 
@@ -49,7 +50,7 @@ def text():
     numbers = sorted(int(r['case'].rpartition('_')[2]) for r in rows)
     assert numbers == list(range(numbers[0], numbers[0] + len(numbers))), 'scored in order'
     return _HEAD.format(
-        **_no_law(), **_resonance('elastic', ELASTIC), **_resonance('mount', MOUNT),
+        **_no_law(), **_tool_forces(), **_resonance('elastic', ELASTIC), **_resonance('mount', MOUNT),
         **known,
         terms=len(library(['a'])), baselines=_baselines(_cases(FOURTH)), **_sizes(result),
         failures=_failures(rows), wrong_error=_share(max(_errors(rows), default=0.0)), worlds=summary['worlds'],
@@ -134,6 +135,23 @@ def _no_law():
                      f'{_share(name["high"])} |')  # fmt: skip
     return {'no_law': '\n'.join(lines), 'lawless_tier': result['tier'],
             'lawless_worlds': len(result['worlds']), 'lawless_numbers': result['numbers']}  # fmt: skip
+
+
+def _tool_forces():
+    result = json.loads(TOOL.read_text(encoding='utf-8'))
+    summary, lines = result['summary'], []
+    for r in result['cases']:
+        law = 'none' if r['said'] is None else f'`{r["said"]}`'
+        error = '' if r['error'] is None else f'{100.0 * r["error"]:.2g} %'
+        others = ', '.join(f'{effect} on {joint}' for effect, joint in r['others'])
+        word = 'found' if r['found'] else 'wrong' if r['wrong'] else ''
+        lines.append(f'| {r["kind"]} | {r["joints"]} | {100.0 * r["share"]:.2g} % | {law} | {error} '
+                     f'| {others} | {", ".join(r["unknown"])} | {word} |')  # fmt: skip
+    inside = summary['with_a_formula']
+    return {'tool_rows': '\n'.join(lines), 'tool_seeds': result['seeds'],
+            'tool_worlds': summary['worlds'], 'tool_inside': inside,
+            'tool_found': round(summary['found'] * inside),
+            'tool_wrong': round(summary['wrong'] * summary['worlds'])}  # fmt: skip
 
 
 def _count(found):

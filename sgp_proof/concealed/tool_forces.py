@@ -47,8 +47,9 @@ from sgp_ros.robots.registry import load_robot
 from sgp_ros.robots.urdf_robot import nominal_tree
 
 NONE = 'none'
-SAME = 0.02
-"""Greatest error of a force that is the true one, relative to the effort that it takes."""
+SAME, NEAR = 0.02, 0.1
+"""Greatest error of a force that is the true one, and of one that is not wrong, relative to the
+effort that it takes."""
 _SHARE, _MOST = (0.01, 0.2), 1.0
 """Share of the mean squared effort of some joint that springs, loads and friction leave of the
 force; the most of all efforts that the force may be."""
@@ -228,7 +229,7 @@ def score(answer, motion, diagnosis):
         'said': None if law is None else law['formula'], 'error': error, 'others': others,
         'unknown': [f['joint'] for f in findings if f['effect'] == 'unknown'],
         'found': error is not None and error <= SAME and not others,
-        'wrong': bool(others) or (error is not None and error > SAME),
+        'wrong': bool(others) or (error is not None and error > NEAR),
     }  # fmt: skip
 
 
