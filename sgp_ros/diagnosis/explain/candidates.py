@@ -118,12 +118,15 @@ def added_inertia(candidates: Sequence[EffectAt], equations: Equations) -> np.nd
 
 
 def passed_on(candidates: Sequence[EffectAt], equations: Equations) -> np.ndarray:
-    """Return what motors pass on of changes of what drives with gains ask for, (k,) factors."""
+    """Return what motors pass on of changes of what drives with gains ask for, (k,) factors.
+
+    Targets that come late change nothing of what a drive makes of the motion itself.
+    """
     motion = equations.motion
     passed = np.ones(motion.tree.size)
     if not isinstance(motion.drive, Servo):
         return passed
-    for s in (s for s in candidates if s.place.joint >= 0):
+    for s in (s for s in candidates if s.place.joint >= 0 and not s.effect.is_late):
         j, change = s.place.joint, s.characteristic
         u = motion.effort[:, j]
         h = _SMALL * max(float(np.sqrt((u**2).mean())), 1e-300)

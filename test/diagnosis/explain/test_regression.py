@@ -255,6 +255,8 @@ def test_a_motor_that_passes_nothing_on_leaves_no_stiffness(has_gains):
         _candidate('saturation', 2, [1e-9]),
         _candidate('saturation', 3, [9.0]),
         _candidate('command_delay', -5, [0.01]),  # of all motors
+        _candidate('command_delay', 0, [0.01]),  # of targets
+        _candidate('actuator_lag', 0, [0.01]),
     ]
     passed = passed_on(laws, SimpleNamespace(motion=motion))
     assert passed == pytest.approx([1.0, 0.5, 0.0, 1.0] if has_gains else [1.0] * 4, abs=1e-6)
